@@ -1,0 +1,2 @@
+//! The `resolvent` command.
+fn main() {}
