@@ -1,0 +1,383 @@
+//! The scene as plain data: what the engine builds from.
+//!
+//! Lengths are in scene units, directions need not be normalised, radiometric values are linear RGB
+//! in SI units (`[f64; 3]`). A single number in a file stands for three equal ones.
+
+use std::path::{Path, PathBuf};
+
+use indexmap::IndexMap;
+
+use crate::plugin::PluginBlock;
+use crate::transform::Transform;
+
+/// Three numbers: a point, a direction or an RGB spectrum.
+pub type Vec3 = [f64; 3];
+
+/// A whole scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scene {
+    /// The file it was read from; empty for a description built in memory. Equal in comparisons to
+    /// any other, as [`crate::Place`] is.
+    pub source: Source,
+    /// Physical meaning of the lengths.
+    pub units: Units,
+    /// The camera.
+    pub camera: Camera,
+    /// Resolution and what is recorded.
+    pub film: Film,
+    /// How long to sample.
+    pub sampling: Sampling,
+    /// The integrator plugin.
+    pub integrator: PluginBlock,
+    /// All lights, except emitting shapes and media.
+    pub lights: Vec<Light>,
+    /// Materials (BSDF plugins) by name.
+    pub materials: IndexMap<String, PluginBlock>,
+    /// Media by name. A medium that no shape names as its interior stands free.
+    pub media: IndexMap<String, Medium>,
+    /// All surfaces.
+    pub shapes: Vec<Shape>,
+}
+
+/// The scene file: errors name it, and relative paths start from its folder.
+#[derive(Debug, Clone, Default)]
+pub struct Source {
+    /// The path as it was given.
+    pub file: PathBuf,
+}
+
+impl PartialEq for Source {
+    fn eq(&self, _: &Source) -> bool {
+        true
+    }
+}
+
+impl Scene {
+    /// The folder that relative paths start from: the scene file's, or the current one if the scene
+    /// comes from no file (the empty path).
+    pub fn base(&self) -> &Path {
+        self.source.file.parent().unwrap_or(Path::new(""))
+    }
+
+    /// The path of a file that the scene names.
+    pub fn resolve(&self, path: impl AsRef<Path>) -> PathBuf {
+        self.base().join(path)
+    }
+
+    /// The media that fill space by their own bounds: those which are no shape's interior.
+    pub fn free_standing(&self) -> impl Iterator<Item = (&str, &Medium)> {
+        self.media
+            .iter()
+            .filter(|(name, _)| {
+                !self
+                    .shapes
+                    .iter()
+                    .any(|s| s.interior.as_deref() == Some(name.as_str()))
+            })
+            .map(|(name, medium)| (name.as_str(), medium))
+    }
+}
+
+/// Physical meaning of the scene's lengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Units {
+    /// Metres per scene unit, > 0.
+    pub meters_per_unit: f64,
+}
+
+impl Default for Units {
+    fn default() -> Units {
+        Units {
+            meters_per_unit: 1.0,
+        }
+    }
+}
+
+/// A perspective camera; with a lens radius it is a thin lens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Where it stands and looks.
+    pub pose: Pose,
+    /// Full horizontal field of view in degrees, in (0, 180), for pixels that are square.
+    pub fov_x_deg: f64,
+    /// Radius of the lens in scene units, ≥ 0; 0 is a pinhole.
+    pub lens_radius: f64,
+    /// Distance along the viewing axis to the plane in focus, > 0. Of no effect for a pinhole.
+    pub focus_distance: f64,
+}
+
+/// Position and orientation of a camera.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Pose {
+    /// From a point towards another.
+    LookAt {
+        /// The centre of the lens.
+        origin: Vec3,
+        /// A point in the middle of the picture, unequal to `origin`.
+        target: Vec3,
+        /// A direction that is up in the picture, not parallel to the viewing axis.
+        up: Vec3,
+    },
+    /// Camera to world. The camera looks along −z, y is up, x is right.
+    Transform(Transform),
+}
+
+impl Camera {
+    /// The camera-to-world transform: the camera looks along −z, y is up, x is right.
+    pub fn to_world(&self) -> Transform {
+        match &self.pose {
+            Pose::Transform(t) => *t,
+            Pose::LookAt { origin, target, up } => Transform::look_at(*origin, *target, *up),
+        }
+    }
+}
+
+/// Resolution and what is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Film {
+    /// Width and height in pixels, each at least 1.
+    pub resolution: [u32; 2],
+    /// The window that is rendered, `[x0, y0, x1, y1]` in pixels; x1 and y1 are outside of it.
+    pub crop: Option<[u32; 4]>,
+    /// Reconstruction filter.
+    pub filter: Filter,
+    /// Further layers to record.
+    pub aovs: Vec<Aov>,
+}
+
+impl Default for Film {
+    fn default() -> Film {
+        Film {
+            resolution: [1280, 720],
+            crop: None,
+            filter: Filter::default(),
+            aovs: Vec::new(),
+        }
+    }
+}
+
+impl Film {
+    /// The window that is rendered: the crop, or everything.
+    pub fn window(&self) -> [u32; 4] {
+        self.crop
+            .unwrap_or([0, 0, self.resolution[0], self.resolution[1]])
+    }
+}
+
+/// Reconstruction filter. Radii are half widths in pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Filter {
+    /// Constant within the radius. Radius 0.5 averages over each pixel.
+    Box {
+        /// Half width in pixels, > 0.
+        radius: f64,
+    },
+    /// Falls linearly to 0 at the radius.
+    Tent {
+        /// Half width in pixels, > 0.
+        radius: f64,
+    },
+    /// exp(−x²/(2σ²)) − exp(−r²/(2σ²)).
+    Gaussian {
+        /// Half width r in pixels, > 0.
+        radius: f64,
+        /// Standard deviation σ in pixels, > 0.
+        sigma: f64,
+    },
+}
+
+impl Default for Filter {
+    fn default() -> Filter {
+        Filter::Box { radius: 0.5 }
+    }
+}
+
+/// A layer that is recorded beside the picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Aov {
+    /// Distance along the viewing axis to the first collision or surface.
+    Depth,
+    /// Albedo there.
+    Albedo,
+    /// Normal there.
+    Normal,
+    /// Variance of the pixel's mean.
+    Variance,
+    /// Samples taken.
+    Samples,
+}
+
+impl Aov {
+    /// All of them.
+    pub const ALL: [Aov; 5] = [
+        Aov::Depth,
+        Aov::Albedo,
+        Aov::Normal,
+        Aov::Variance,
+        Aov::Samples,
+    ];
+
+    /// The name in scene files, and of the layer in images.
+    pub fn name(self) -> &'static str {
+        match self {
+            Aov::Depth => "depth",
+            Aov::Albedo => "albedo",
+            Aov::Normal => "normal",
+            Aov::Variance => "variance",
+            Aov::Samples => "samples",
+        }
+    }
+}
+
+/// How long to sample, and with which random numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sampling {
+    /// When to stop.
+    pub budget: Budget,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+impl Default for Sampling {
+    fn default() -> Sampling {
+        Sampling {
+            budget: Budget::Spp(64),
+            seed: 0,
+        }
+    }
+}
+
+/// When a rendering is done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Budget {
+    /// After so many samples per pixel, ≥ 1.
+    Spp(u64),
+    /// After so many seconds, > 0.
+    Time(f64),
+    /// When the estimated relative error of the picture is at most this, > 0.
+    Error(f64),
+}
+
+/// A light that is no emitting shape.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Light {
+    /// Light from everywhere, at an infinite distance.
+    Environment(Environment),
+    /// Light from one direction.
+    Distant {
+        /// Towards the light.
+        to_light: Vec3,
+        /// Irradiance on a plane that faces the light, W·m⁻², ≥ 0, whatever the angle.
+        irradiance: Vec3,
+        /// Full angle of the disc that the light seems to be, degrees, in [0, 180]; 0 is parallel light.
+        angle_deg: f64,
+    },
+    /// Light from a point.
+    Point {
+        /// Where it is.
+        position: Vec3,
+        /// Radiant intensity, W·sr⁻¹, ≥ 0.
+        intensity: Vec3,
+    },
+    /// A parallelogram that emits from the side where edge_u × edge_v points.
+    Rectangle {
+        /// One corner.
+        corner: Vec3,
+        /// From the corner to a neighbouring one.
+        edge_u: Vec3,
+        /// From the corner to the other neighbouring one.
+        edge_v: Vec3,
+        /// Emitted radiance, W·sr⁻¹·m⁻², ≥ 0.
+        radiance: Vec3,
+        /// Emits from both sides.
+        two_sided: bool,
+    },
+}
+
+/// Light from everywhere.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Environment {
+    /// The same radiance from all directions.
+    Constant {
+        /// W·sr⁻¹·m⁻², ≥ 0.
+        radiance: Vec3,
+    },
+    /// A latitude-longitude image (OpenEXR's convention): +y is up, the centre of the image is +z, and
+    /// a direction ω stands at u = ½ − atan2(ω_x, ω_z)/2π, v = acos(ω_y)/π from the upper left corner.
+    Image {
+        /// The image, as the scene names it; see [`Scene::resolve`].
+        file: String,
+        /// Factor on its pixels, ≥ 0.
+        scale: Vec3,
+        /// Image to world, a rotation.
+        rotation: Transform,
+    },
+}
+
+/// A medium: its plugin and its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Medium {
+    /// The plugin with its parameters.
+    pub block: PluginBlock,
+    /// The medium's space to world.
+    pub transform: Transform,
+}
+
+/// A surface. At least one of `material`, `emission` and `interior` is given. Without a material, light
+/// passes straight through if there is an interior, and is absorbed otherwise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shape {
+    /// Where it is.
+    pub geometry: Geometry,
+    /// Name in [`Scene::materials`].
+    pub material: Option<String>,
+    /// Radiance emitted from the outer side, W·sr⁻¹·m⁻², ≥ 0.
+    pub emission: Option<Vec3>,
+    /// Name in [`Scene::media`] of what fills it; for closed shapes only.
+    pub interior: Option<String>,
+}
+
+/// Where a surface is. The outer side is the one the normal points to.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Geometry {
+    /// A sphere, outside out.
+    Sphere {
+        /// Its centre.
+        center: Vec3,
+        /// Its radius, > 0.
+        radius: f64,
+    },
+    /// A parallelogram with normal edge_u × edge_v.
+    Rectangle {
+        /// One corner.
+        corner: Vec3,
+        /// From the corner to a neighbouring one.
+        edge_u: Vec3,
+        /// From the corner to the other neighbouring one.
+        edge_v: Vec3,
+    },
+    /// Triangles in the scene file, counter-clockwise seen from outside.
+    Mesh(Mesh),
+    /// Triangles in a PLY file, counter-clockwise seen from outside.
+    Ply {
+        /// The file, as the scene names it; see [`Scene::resolve`].
+        file: String,
+        /// The file's space to world.
+        transform: Transform,
+    },
+}
+
+/// Triangles in the scene file.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Mesh {
+    /// Corners.
+    pub positions: Vec<Vec3>,
+    /// Three indices into `positions` per triangle.
+    pub indices: Vec<[u32; 3]>,
+    /// One shading normal per corner, or empty.
+    pub normals: Vec<Vec3>,
+    /// One texture coordinate per corner, or empty.
+    pub uvs: Vec<[f64; 2]>,
+    /// The mesh's space to world.
+    pub transform: Transform,
+}

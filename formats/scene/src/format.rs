@@ -1,0 +1,565 @@
+//! The scene format as tables: one row per key.
+//!
+//! The checker ([`crate::check`]) and the JSON Schema ([`crate::schema`]) are both driven by them, so that
+//! what the one accepts is what the other describes.
+
+/// The format's version, the value of the key `resolvent`.
+pub const VERSION: u32 = 1;
+
+/// The largest coordinate, in scene units: its square is still an f32.
+pub(crate) const FAR: f64 = 1e18;
+
+/// The largest radiometric value.
+const BRIGHT: f64 = 1e30;
+
+/// A range of numbers.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Range {
+    pub min: f64,
+    pub max: f64,
+    pub min_excluded: bool,
+    pub max_excluded: bool,
+}
+
+impl Range {
+    const fn closed(min: f64, max: f64) -> Range {
+        Range {
+            min,
+            max,
+            min_excluded: false,
+            max_excluded: false,
+        }
+    }
+
+    const fn above(min: f64, max: f64) -> Range {
+        Range {
+            min,
+            max,
+            min_excluded: true,
+            max_excluded: false,
+        }
+    }
+
+    const fn open(min: f64, max: f64) -> Range {
+        Range {
+            min,
+            max,
+            min_excluded: true,
+            max_excluded: true,
+        }
+    }
+
+    pub fn contains(&self, x: f64) -> bool {
+        (x > self.min || (x == self.min && !self.min_excluded))
+            && (x < self.max || (x == self.max && !self.max_excluded))
+    }
+}
+
+/// Words for a range: "in [0, 1)", "≥ 0", "> 0".
+impl std::fmt::Display for Range {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let left = if self.min_excluded { '(' } else { '[' };
+        let right = if self.max_excluded { ')' } else { ']' };
+        match (self.min.is_finite(), self.max.is_finite()) {
+            (true, true) => write!(
+                f,
+                "in {left}{}, {}{right}",
+                short(self.min),
+                short(self.max)
+            ),
+            (true, false) => write!(
+                f,
+                "{} {}",
+                if self.min_excluded { '>' } else { '≥' },
+                short(self.min)
+            ),
+            (false, true) => write!(
+                f,
+                "{} {}",
+                if self.max_excluded { '<' } else { '≤' },
+                short(self.max)
+            ),
+            (false, false) => f.write_str("that is finite"),
+        }
+    }
+}
+
+/// Numbers as one would write them: 1e18, not 1000000000000000000.
+fn short(x: f64) -> String {
+    if x != 0.0 && !(1e-4..1e7).contains(&x.abs()) {
+        format!("{x:e}")
+    } else {
+        format!("{x}")
+    }
+}
+
+/// What may stand under a key.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Kind {
+    Bool,
+    Number(Range),
+    /// A whole number.
+    Integer(u64, u64),
+    /// So many whole numbers.
+    Integers(usize, u64, u64),
+    /// Any text.
+    Text,
+    /// A text that is not empty: names and paths.
+    Name,
+    /// A list of different names out of these.
+    Choices(&'static [&'static str]),
+    /// Three coordinates.
+    Vec3,
+    /// A list of points or directions.
+    Vec3s,
+    /// A list of pairs of numbers.
+    Pairs,
+    /// A list of three indices each.
+    Triangles,
+    /// One number or three, ≥ 0.
+    Spectrum,
+    /// A matrix or a list of operations.
+    Transform,
+    /// The parameters of a plugin of this kind.
+    Params(&'static str),
+    Object(&'static Object),
+    /// An object whose kind is the value of its key `type`.
+    Variants(&'static [&'static Object]),
+    List(&'static Kind),
+    /// An object with names as keys.
+    Named(&'static Kind),
+}
+
+/// An object with known keys.
+#[derive(Debug)]
+pub(crate) struct Object {
+    /// Name in the schema; of a variant, its `type`.
+    pub name: &'static str,
+    pub help: &'static str,
+    pub fields: &'static [Field],
+    pub rules: &'static [Rule],
+}
+
+#[derive(Debug)]
+pub(crate) struct Field {
+    pub name: &'static str,
+    pub kind: Kind,
+    pub required: bool,
+    pub help: &'static str,
+}
+
+/// Which keys go together.
+#[derive(Debug)]
+pub(crate) enum Rule {
+    ExactlyOne(&'static [&'static str]),
+    AtMostOne(&'static [&'static str]),
+    AtLeastOne(&'static [&'static str]),
+    /// The first key asks for the second.
+    Needs(&'static str, &'static str),
+}
+
+const fn need(name: &'static str, kind: Kind, help: &'static str) -> Field {
+    Field {
+        name,
+        kind,
+        required: true,
+        help,
+    }
+}
+
+const fn may(name: &'static str, kind: Kind, help: &'static str) -> Field {
+    Field {
+        name,
+        kind,
+        required: false,
+        help,
+    }
+}
+
+pub(crate) static SCENE: Object = Object {
+    name: "scene",
+    help: "A Resolvent scene",
+    fields: &[
+        may(
+            "$schema",
+            Kind::Text,
+            "Address of the JSON Schema, for editors",
+        ),
+        need(
+            "resolvent",
+            Kind::Integer(1, VERSION as u64),
+            "Version of the scene format",
+        ),
+        may(
+            "units",
+            Kind::Object(&UNITS),
+            "Physical meaning of the lengths",
+        ),
+        need("camera", Kind::Variants(&[&PERSPECTIVE]), "The camera"),
+        may(
+            "film",
+            Kind::Object(&FILM),
+            "Resolution and what is recorded",
+        ),
+        may(
+            "sampling",
+            Kind::Object(&SAMPLING),
+            "How long to sample (64 samples per pixel)",
+        ),
+        may(
+            "integrator",
+            Kind::Object(&INTEGRATOR),
+            "The integrator plugin (pt)",
+        ),
+        may(
+            "lights",
+            Kind::List(&Kind::Variants(&[
+                &ENVIRONMENT,
+                &DISTANT,
+                &POINT,
+                &RECTANGLE_LIGHT,
+            ])),
+            "Lights",
+        ),
+        may(
+            "materials",
+            Kind::Named(&Kind::Object(&MATERIAL)),
+            "Materials by name",
+        ),
+        may(
+            "media",
+            Kind::Named(&Kind::Object(&MEDIUM)),
+            "Media by name; free-standing unless a shape's interior",
+        ),
+        may(
+            "shapes",
+            Kind::List(&Kind::Variants(&[&SPHERE, &RECTANGLE, &MESH, &PLY])),
+            "Surfaces",
+        ),
+    ],
+    rules: &[],
+};
+
+static UNITS: Object = Object {
+    name: "units",
+    help: "Physical meaning of the lengths",
+    fields: &[may(
+        "meters_per_unit",
+        Kind::Number(Range::above(0.0, FAR)),
+        "Metres per scene unit (1)",
+    )],
+    rules: &[],
+};
+
+static PERSPECTIVE: Object = Object {
+    name: "perspective",
+    help: "A pinhole camera, or a thin lens if lens_radius > 0",
+    fields: &[
+        may("origin", Kind::Vec3, "Where the camera stands"),
+        may("target", Kind::Vec3, "A point in the middle of the picture"),
+        may(
+            "up",
+            Kind::Vec3,
+            "A direction that is up in the picture ([0, 1, 0])",
+        ),
+        may(
+            "transform",
+            Kind::Transform,
+            "Camera to world; it looks along -z, y is up",
+        ),
+        need(
+            "fov_x_deg",
+            Kind::Number(Range::open(0.0, 180.0)),
+            "Full horizontal field of view in degrees",
+        ),
+        may(
+            "lens_radius",
+            Kind::Number(Range::closed(0.0, FAR)),
+            "Radius of the lens; 0 is a pinhole (0)",
+        ),
+        may(
+            "focus_distance",
+            Kind::Number(Range::above(0.0, FAR)),
+            "Distance to the plane in focus (the distance to the target)",
+        ),
+    ],
+    rules: &[
+        Rule::ExactlyOne(&["origin", "transform"]),
+        Rule::Needs("origin", "target"),
+        Rule::AtMostOne(&["target", "transform"]),
+        Rule::AtMostOne(&["up", "transform"]),
+    ],
+};
+
+static FILM: Object = Object {
+    name: "film",
+    help: "Resolution and what is recorded",
+    fields: &[
+        need(
+            "resolution",
+            Kind::Integers(2, 1, 65_536),
+            "Width and height in pixels",
+        ),
+        may(
+            "crop",
+            Kind::Integers(4, 0, 65_536),
+            "Window to render: x0, y0, x1, y1; x1 and y1 are outside",
+        ),
+        may(
+            "filter",
+            Kind::Variants(&[&BOX, &TENT, &GAUSSIAN]),
+            "Reconstruction filter (box of radius 0.5)",
+        ),
+        may(
+            "aovs",
+            Kind::Choices(&["depth", "albedo", "normal", "variance", "samples"]),
+            "Further layers",
+        ),
+    ],
+    rules: &[],
+};
+
+const RADIUS: Kind = Kind::Number(Range::above(0.0, 64.0));
+
+static BOX: Object = Object {
+    name: "box",
+    help: "Constant within the radius",
+    fields: &[may("radius", RADIUS, "Half width in pixels (0.5)")],
+    rules: &[],
+};
+
+static TENT: Object = Object {
+    name: "tent",
+    help: "Falls linearly to 0 at the radius",
+    fields: &[may("radius", RADIUS, "Half width in pixels (1)")],
+    rules: &[],
+};
+
+static GAUSSIAN: Object = Object {
+    name: "gaussian",
+    help: "exp(-x²/2σ²) - exp(-r²/2σ²)",
+    fields: &[
+        may("radius", RADIUS, "Half width in pixels (1.5)"),
+        may("sigma", RADIUS, "σ in pixels (0.5)"),
+    ],
+    rules: &[],
+};
+
+static SAMPLING: Object = Object {
+    name: "sampling",
+    help: "How long to sample, and with which random numbers",
+    fields: &[
+        may("spp", Kind::Integer(1, 1 << 40), "Samples per pixel"),
+        may("time", Kind::Number(Range::above(0.0, 1e9)), "Seconds"),
+        may(
+            "error",
+            Kind::Number(Range::above(0.0, 1e3)),
+            "Estimated relative error to reach",
+        ),
+        may(
+            "seed",
+            Kind::Integer(0, u64::MAX),
+            "Seed of all random numbers (0)",
+        ),
+    ],
+    rules: &[Rule::AtMostOne(&["spp", "time", "error"])],
+};
+
+const PLUGIN: Field = need(
+    "plugin",
+    Kind::Name,
+    "Name of the plugin, or path of its library",
+);
+
+static INTEGRATOR: Object = Object {
+    name: "integrator",
+    help: "An integrator plugin",
+    fields: &[
+        PLUGIN,
+        may("params", Kind::Params("integrator"), "Its parameters"),
+    ],
+    rules: &[],
+};
+
+static MATERIAL: Object = Object {
+    name: "material",
+    help: "A BSDF plugin",
+    fields: &[
+        PLUGIN,
+        may("params", Kind::Params("bsdf"), "Its parameters"),
+    ],
+    rules: &[],
+};
+
+static MEDIUM: Object = Object {
+    name: "medium",
+    help: "A medium plugin",
+    fields: &[
+        PLUGIN,
+        may("params", Kind::Params("medium"), "Its parameters"),
+        may("transform", Kind::Transform, "The medium's space to world"),
+    ],
+    rules: &[],
+};
+
+const RADIANCE: &str = "Radiance, W/(sr m²): one number or RGB";
+
+static ENVIRONMENT: Object = Object {
+    name: "environment",
+    help: "Light from everywhere",
+    fields: &[
+        may("radiance", Kind::Spectrum, RADIANCE),
+        may(
+            "image",
+            Kind::Name,
+            "Latitude-longitude image; +y is up, its centre is +z",
+        ),
+        may("scale", Kind::Spectrum, "Factor on the image (1)"),
+        may("transform", Kind::Transform, "Image to world: a rotation"),
+    ],
+    rules: &[
+        Rule::ExactlyOne(&["radiance", "image"]),
+        Rule::Needs("scale", "image"),
+        Rule::Needs("transform", "image"),
+    ],
+};
+
+static DISTANT: Object = Object {
+    name: "distant",
+    help: "Light from one direction, such as a sun",
+    fields: &[
+        need("to_light", Kind::Vec3, "Direction towards the light"),
+        need(
+            "irradiance",
+            Kind::Spectrum,
+            "On a plane that faces the light, W/m²: one number or RGB",
+        ),
+        may(
+            "angle_deg",
+            Kind::Number(Range::closed(0.0, 180.0)),
+            "Full angle of its disc in degrees; the sun's is 0.53 (0)",
+        ),
+    ],
+    rules: &[],
+};
+
+static POINT: Object = Object {
+    name: "point",
+    help: "Light from a point",
+    fields: &[
+        need("position", Kind::Vec3, "Where it is"),
+        need(
+            "intensity",
+            Kind::Spectrum,
+            "Radiant intensity, W/sr: one number or RGB",
+        ),
+    ],
+    rules: &[],
+};
+
+static RECTANGLE_LIGHT: Object = Object {
+    name: "rectangle",
+    help: "A parallelogram that emits from the side where edge_u × edge_v points",
+    fields: &[
+        need("corner", Kind::Vec3, "One corner"),
+        need(
+            "edge_u",
+            Kind::Vec3,
+            "From the corner to a neighbouring one",
+        ),
+        need(
+            "edge_v",
+            Kind::Vec3,
+            "From the corner to the other neighbouring one",
+        ),
+        need("radiance", Kind::Spectrum, RADIANCE),
+        may("two_sided", Kind::Bool, "Emits from both sides (false)"),
+    ],
+    rules: &[],
+};
+
+const MATERIAL_NAME: Field = may("material", Kind::Name, "Name of a material");
+const EMISSION: Field = may(
+    "emission",
+    Kind::Spectrum,
+    "Radiance emitted from the outer side: one number or RGB",
+);
+const INTERIOR: Field = may("interior", Kind::Name, "Name of the medium that fills it");
+const TO_WORLD: Field = may("transform", Kind::Transform, "The shape's space to world");
+
+static SPHERE: Object = Object {
+    name: "sphere",
+    help: "A sphere",
+    fields: &[
+        need("center", Kind::Vec3, "Its centre"),
+        need("radius", Kind::Number(Range::above(0.0, FAR)), "Its radius"),
+        MATERIAL_NAME,
+        EMISSION,
+        INTERIOR,
+    ],
+    rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
+};
+
+static RECTANGLE: Object = Object {
+    name: "rectangle",
+    help: "A parallelogram with normal edge_u × edge_v",
+    fields: &[
+        need("corner", Kind::Vec3, "One corner"),
+        need(
+            "edge_u",
+            Kind::Vec3,
+            "From the corner to a neighbouring one",
+        ),
+        need(
+            "edge_v",
+            Kind::Vec3,
+            "From the corner to the other neighbouring one",
+        ),
+        MATERIAL_NAME,
+        EMISSION,
+    ],
+    rules: &[Rule::AtLeastOne(&["material", "emission"])],
+};
+
+static MESH: Object = Object {
+    name: "mesh",
+    help: "Triangles, counter-clockwise seen from outside",
+    fields: &[
+        need("positions", Kind::Vec3s, "Corners"),
+        need(
+            "indices",
+            Kind::Triangles,
+            "Three indices into positions per triangle",
+        ),
+        may("normals", Kind::Vec3s, "One shading normal per corner"),
+        may("uvs", Kind::Pairs, "One texture coordinate per corner"),
+        TO_WORLD,
+        MATERIAL_NAME,
+        EMISSION,
+        INTERIOR,
+    ],
+    rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
+};
+
+static PLY: Object = Object {
+    name: "ply",
+    help: "Triangles of a PLY file, counter-clockwise seen from outside",
+    fields: &[
+        need(
+            "file",
+            Kind::Name,
+            "The PLY file, relative to the scene file",
+        ),
+        TO_WORLD,
+        MATERIAL_NAME,
+        EMISSION,
+        INTERIOR,
+    ],
+    rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
+};
+
+/// The range of every coordinate.
+pub(crate) const COORDINATE: Range = Range::closed(-FAR, FAR);
+
+/// The range of every radiometric value.
+pub(crate) const POWER: Range = Range::closed(0.0, BRIGHT);

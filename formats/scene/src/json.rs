@@ -1,0 +1,548 @@
+//! A JSON reader that keeps the position of every value.
+//!
+//! `serde_json` gives no positions for values that are well-formed but wrong for a scene, and it
+//! keeps the last of two equal keys in silence. This reader accepts exactly RFC 8259, with a limit
+//! on nesting, and refuses equal keys in one object. A leading byte-order mark is skipped.
+
+use std::collections::HashSet;
+
+use crate::error::Place;
+
+/// How deeply lists and objects may be nested.
+pub(crate) const MAX_DEPTH: usize = 64;
+
+/// The largest text that is read, in bytes. Larger meshes belong into PLY files.
+pub(crate) const MAX_BYTES: u64 = 256 << 20;
+
+/// One JSON value and the byte offset of its first character.
+#[derive(Debug)]
+pub(crate) struct Node {
+    pub start: u32,
+    pub data: Data,
+}
+
+#[derive(Debug)]
+pub(crate) enum Data {
+    Null,
+    Bool(bool),
+    Number(f64),
+    Text(Box<str>),
+    List(Vec<Node>),
+    Object(Vec<Member>),
+}
+
+/// One `"key": value` of an object.
+#[derive(Debug)]
+pub(crate) struct Member {
+    pub key: Box<str>,
+    pub key_start: u32,
+    pub value: Node,
+}
+
+impl Node {
+    /// The value under `key`, if this is an object that has it.
+    pub fn get(&self, key: &str) -> Option<&Node> {
+        match &self.data {
+            Data::Object(members) => members.iter().find(|m| &*m.key == key).map(|m| &m.value),
+            _ => None,
+        }
+    }
+
+    /// What an error message says was found here.
+    pub fn found(&self) -> String {
+        match &self.data {
+            Data::Null => "null".into(),
+            Data::Bool(b) => format!("{b}"),
+            Data::Number(x) => format!("{x:?}"),
+            Data::Text(t) => quoted(t),
+            Data::List(items) if items.is_empty() => "an empty list".into(),
+            Data::List(items) => format!("a list of {}", items.len()),
+            Data::Object(_) => "an object".into(),
+        }
+    }
+}
+
+/// `text` in double quotes, escaped, and cut if long: errors must stay one readable line.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut shown: String = text.chars().take(40).collect();
+    if shown.len() < text.len() {
+        shown.push('…');
+    }
+    format!("{shown:?}")
+}
+
+/// A parsed text: its values and what is needed to say where they are.
+#[derive(Debug)]
+pub(crate) struct Document<'t> {
+    text: &'t str,
+    line_starts: Vec<u32>,
+    pub root: Node,
+}
+
+/// A syntax error: where, and what is wrong there.
+#[derive(Debug)]
+pub(crate) struct SyntaxError {
+    pub place: Place,
+    pub what: String,
+}
+
+impl<'t> Document<'t> {
+    /// Parses a whole text.
+    pub fn parse(bytes: &'t [u8]) -> Result<Document<'t>, SyntaxError> {
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(SyntaxError {
+                place: Place::new("$".into(), 1, 1),
+                what: format!(
+                    "the text has {} MiB, more than the {} MiB that are read (put large meshes into PLY files)",
+                    bytes.len() >> 20,
+                    MAX_BYTES >> 20
+                ),
+            });
+        }
+        let text = match std::str::from_utf8(bytes) {
+            Ok(text) => text,
+            Err(e) => {
+                let valid = &bytes[..e.valid_up_to()];
+                let line = valid.iter().filter(|b| **b == b'\n').count() + 1;
+                let last = valid.rsplit(|b| *b == b'\n').next().unwrap_or(&[]);
+                let column = String::from_utf8_lossy(last).chars().count() + 1;
+                return Err(SyntaxError {
+                    place: Place::new("$".into(), line, column),
+                    what: format!("byte 0x{:02x} is not UTF-8 text", bytes[e.valid_up_to()]),
+                });
+            }
+        };
+        let mut parser = Parser {
+            text,
+            at: 0,
+            depth: 0,
+        };
+        if text.starts_with('\u{feff}') {
+            parser.at = '\u{feff}'.len_utf8();
+        }
+        let root = parser.document();
+        let line_starts = std::iter::once(0)
+            .chain(
+                text.bytes()
+                    .enumerate()
+                    .filter(|(_, b)| *b == b'\n')
+                    .map(|(i, _)| i as u32 + 1),
+            )
+            .collect();
+        match root {
+            Ok(root) => Ok(Document {
+                text,
+                line_starts,
+                root,
+            }),
+            Err((at, what)) => {
+                let null = Node {
+                    start: 0,
+                    data: Data::Null,
+                };
+                let document = Document {
+                    text,
+                    line_starts,
+                    root: null,
+                };
+                let (line, column) = document.line_column(at);
+                Err(SyntaxError {
+                    place: Place::new("$".into(), line, column),
+                    what,
+                })
+            }
+        }
+    }
+
+    fn line_column(&self, offset: usize) -> (usize, usize) {
+        let line = self
+            .line_starts
+            .partition_point(|s| *s as usize <= offset)
+            .max(1);
+        let start = self.line_starts[line - 1] as usize;
+        let column = self
+            .text
+            .get(start..offset)
+            .map_or(0, |t| t.chars().count())
+            + 1;
+        (line, column)
+    }
+
+    /// Path, line and column of a value of this document.
+    ///
+    /// The path is found by walking down from the root to the value with this start, so that nothing
+    /// needs to carry paths around while all is well.
+    pub fn place(&self, node: &Node) -> Place {
+        self.place_of(node.start, None)
+    }
+
+    /// The place of a key itself: its path, and the position of the key rather than of its value.
+    pub fn place_of_key(&self, member: &Member) -> Place {
+        self.place_of(member.value.start, Some(member.key_start))
+    }
+
+    fn place_of(&self, start: u32, shown: Option<u32>) -> Place {
+        let mut path = String::from("$");
+        let mut node = &self.root;
+        while node.start != start {
+            let child = match &node.data {
+                Data::List(items) => {
+                    let i = items
+                        .partition_point(|n| n.start <= start)
+                        .saturating_sub(1);
+                    path.push_str(&format!("[{i}]"));
+                    items.get(i)
+                }
+                Data::Object(members) => {
+                    let i = members
+                        .partition_point(|m| m.value.start <= start)
+                        .saturating_sub(1);
+                    if let Some(m) = members.get(i) {
+                        path.push_str(&key_step(&m.key));
+                    }
+                    members.get(i).map(|m| &m.value)
+                }
+                _ => None,
+            };
+            match child {
+                Some(child) => node = child,
+                None => break,
+            }
+        }
+        let (line, column) = self.line_column(shown.unwrap_or(start) as usize);
+        Place::new(path, line, column)
+    }
+
+    /// The value as an integer, exactly: `f64` holds integers only up to 2⁵³, seeds use all 64 bits.
+    pub fn integer(&self, node: &Node) -> Option<i128> {
+        let Data::Number(x) = node.data else {
+            return None;
+        };
+        let rest = self.text.get(node.start as usize..)?;
+        let end = rest.find(|c: char| !matches!(c, '0'..='9' | '-' | '+' | '.' | 'e' | 'E'));
+        let token = &rest[..end.unwrap_or(rest.len())];
+        if let Ok(i) = token.parse::<i128>() {
+            return Some(i);
+        }
+        (x.fract() == 0.0 && x.abs() <= 9_007_199_254_740_992.0).then_some(x as i128)
+    }
+}
+
+/// One step of a JSON path: `.key`, or `["odd key"]`.
+pub(crate) fn key_step(key: &str) -> String {
+    let plain = !key.is_empty()
+        && key
+            .chars()
+            .all(|c| c.is_alphanumeric() || c == '_' || c == '-');
+    if plain {
+        format!(".{key}")
+    } else {
+        format!("[{}]", quoted(key))
+    }
+}
+
+type Fallible<T> = Result<T, (usize, String)>;
+
+struct Parser<'t> {
+    text: &'t str,
+    at: usize,
+    depth: usize,
+}
+
+impl Parser<'_> {
+    fn document(&mut self) -> Fallible<Node> {
+        let root = self.value()?;
+        self.space();
+        match self.peek() {
+            None => Ok(root),
+            Some(_) => Err(self.unexpected("the end of the file")),
+        }
+    }
+
+    fn peek(&self) -> Option<u8> {
+        self.text.as_bytes().get(self.at).copied()
+    }
+
+    fn space(&mut self) {
+        while matches!(self.peek(), Some(b' ' | b'\t' | b'\n' | b'\r')) {
+            self.at += 1;
+        }
+    }
+
+    fn unexpected(&self, expected: &str) -> (usize, String) {
+        let rest = self.text.get(self.at..).unwrap_or("");
+        let found = match rest.chars().next() {
+            None => "the end of the file".to_string(),
+            Some('/') => "\"/\" (JSON has no comments)".to_string(),
+            Some('\'') => "\"'\" (JSON texts stand in double quotes)".to_string(),
+            Some(c) if c.is_alphabetic() => {
+                let word: String = rest.chars().take_while(|c| c.is_alphanumeric()).collect();
+                quoted(&word)
+            }
+            Some(c) => quoted(&c.to_string()),
+        };
+        (self.at, format!("expected {expected}, found {found}"))
+    }
+
+    fn value(&mut self) -> Fallible<Node> {
+        self.space();
+        let start = self.at as u32;
+        let data = match self.peek() {
+            Some(b'{') => self.nested(Self::object)?,
+            Some(b'[') => self.nested(Self::list)?,
+            Some(b'"') => Data::Text(self.string()?.into_boxed_str()),
+            Some(b'-' | b'0'..=b'9') => self.number()?,
+            _ => {
+                let words = [
+                    ("null", Data::Null),
+                    ("true", Data::Bool(true)),
+                    ("false", Data::Bool(false)),
+                ];
+                let rest = self.text.get(self.at..).unwrap_or("");
+                let word_end = rest
+                    .find(|c: char| !c.is_alphanumeric())
+                    .unwrap_or(rest.len());
+                match words
+                    .into_iter()
+                    .find(|(word, _)| *word == &rest[..word_end])
+                {
+                    Some((word, data)) => {
+                        self.at += word.len();
+                        data
+                    }
+                    None => return Err(self.unexpected("a value")),
+                }
+            }
+        };
+        Ok(Node { start, data })
+    }
+
+    fn nested(&mut self, body: fn(&mut Self) -> Fallible<Data>) -> Fallible<Data> {
+        if self.depth == MAX_DEPTH {
+            return Err((self.at, format!("nested more than {MAX_DEPTH} deep")));
+        }
+        self.depth += 1;
+        self.at += 1;
+        let data = body(self);
+        self.depth -= 1;
+        data
+    }
+
+    fn list(&mut self) -> Fallible<Data> {
+        let mut items = Vec::new();
+        self.space();
+        if self.peek() == Some(b']') {
+            self.at += 1;
+            return Ok(Data::List(items));
+        }
+        loop {
+            items.push(self.value()?);
+            self.space();
+            match self.peek() {
+                Some(b',') => self.at += 1,
+                Some(b']') => {
+                    self.at += 1;
+                    items.shrink_to_fit();
+                    return Ok(Data::List(items));
+                }
+                _ => return Err(self.unexpected("\",\" or \"]\"")),
+            }
+        }
+    }
+
+    fn object(&mut self) -> Fallible<Data> {
+        let mut members: Vec<Member> = Vec::new();
+        let mut keys: HashSet<Box<str>> = HashSet::new();
+        self.space();
+        if self.peek() == Some(b'}') {
+            self.at += 1;
+            return Ok(Data::Object(members));
+        }
+        loop {
+            self.space();
+            let key_start = self.at;
+            if self.peek() != Some(b'"') {
+                let what = if self.peek() == Some(b'}') {
+                    "a key (a comma must not end an object)"
+                } else {
+                    "a key in double quotes"
+                };
+                return Err(self.unexpected(what));
+            }
+            let key = self.string()?.into_boxed_str();
+            if !keys.insert(key.clone()) {
+                return Err((
+                    key_start,
+                    format!("the key {} appears twice in one object", quoted(&key)),
+                ));
+            }
+            self.space();
+            if self.peek() != Some(b':') {
+                return Err(self.unexpected("\":\""));
+            }
+            self.at += 1;
+            let value = self.value()?;
+            members.push(Member {
+                key,
+                key_start: key_start as u32,
+                value,
+            });
+            self.space();
+            match self.peek() {
+                Some(b',') => self.at += 1,
+                Some(b'}') => {
+                    self.at += 1;
+                    return Ok(Data::Object(members));
+                }
+                _ => return Err(self.unexpected("\",\" or \"}\"")),
+            }
+        }
+    }
+
+    /// number = [ "-" ] int [ frac ] [ exp ] (RFC 8259 §6).
+    fn number(&mut self) -> Fallible<Data> {
+        let start = self.at;
+        if self.peek() == Some(b'-') {
+            self.at += 1;
+        }
+        match self.peek() {
+            Some(b'0') => {
+                self.at += 1;
+                if matches!(self.peek(), Some(b'0'..=b'9')) {
+                    return Err((
+                        start,
+                        "a number must not start with a zero and go on with digits".into(),
+                    ));
+                }
+            }
+            Some(b'1'..=b'9') => self.digits()?,
+            _ => return Err(self.unexpected("a digit")),
+        }
+        if self.peek() == Some(b'.') {
+            self.at += 1;
+            self.digits()?;
+        }
+        if matches!(self.peek(), Some(b'e' | b'E')) {
+            self.at += 1;
+            if matches!(self.peek(), Some(b'+' | b'-')) {
+                self.at += 1;
+            }
+            self.digits()?;
+        }
+        let token = &self.text[start..self.at];
+        match token.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(Data::Number(x)),
+            _ => Err((
+                start,
+                format!(
+                    "the number {} is out of range: at most 1.8e308 in magnitude",
+                    quoted(token)
+                ),
+            )),
+        }
+    }
+
+    fn digits(&mut self) -> Fallible<()> {
+        if !matches!(self.peek(), Some(b'0'..=b'9')) {
+            return Err(self.unexpected("a digit"));
+        }
+        while matches!(self.peek(), Some(b'0'..=b'9')) {
+            self.at += 1;
+        }
+        Ok(())
+    }
+
+    /// A string; `at` is on its opening quote.
+    fn string(&mut self) -> Fallible<String> {
+        let open = self.at;
+        self.at += 1;
+        let mut out = String::new();
+        loop {
+            // All bytes looked for are ASCII, so every slice below ends on a character boundary.
+            let plain = self.text.as_bytes()[self.at..]
+                .iter()
+                .position(|b| matches!(b, b'"' | b'\\') || *b < 0x20)
+                .ok_or((open, "this text has no closing quote".to_string()))?;
+            out.push_str(&self.text[self.at..self.at + plain]);
+            self.at += plain;
+            match self.peek() {
+                Some(b'"') => {
+                    self.at += 1;
+                    return Ok(out);
+                }
+                Some(b'\\') => out.push(self.escape()?),
+                Some(b'\n' | b'\r') => {
+                    return Err((open, "this text has no closing quote on its line".into()));
+                }
+                other => {
+                    let byte = other.unwrap_or(0);
+                    return Err((
+                        self.at,
+                        format!(
+                            "control character 0x{byte:02x} in a text (write it as \\u{byte:04x})"
+                        ),
+                    ));
+                }
+            }
+        }
+    }
+
+    fn escape(&mut self) -> Fallible<char> {
+        let start = self.at;
+        self.at += 1;
+        let escaped = match self.peek() {
+            Some(b'"') => '"',
+            Some(b'\\') => '\\',
+            Some(b'/') => '/',
+            Some(b'b') => '\u{8}',
+            Some(b'f') => '\u{c}',
+            Some(b'n') => '\n',
+            Some(b'r') => '\r',
+            Some(b't') => '\t',
+            Some(b'u') => {
+                self.at += 1;
+                let high = self.hex4(start)?;
+                return self.unicode(start, high);
+            }
+            _ => {
+                return Err((
+                    start,
+                    "unknown escape: one of \\\" \\\\ \\/ \\b \\f \\n \\r \\t \\uXXXX".into(),
+                ));
+            }
+        };
+        self.at += 1;
+        Ok(escaped)
+    }
+
+    /// Joins a surrogate pair; a surrogate alone encodes no character.
+    fn unicode(&mut self, start: usize, high: u32) -> Fallible<char> {
+        let mut code = high;
+        if (0xd800..0xdc00).contains(&high) && self.text.as_bytes()[self.at..].starts_with(b"\\u") {
+            self.at += 2;
+            let low = self.hex4(start)?;
+            if (0xdc00..0xe000).contains(&low) {
+                code = 0x10000 + ((high - 0xd800) << 10) + (low - 0xdc00);
+            }
+        }
+        char::from_u32(code).ok_or_else(|| {
+            (
+                start,
+                format!("\\u{high:04x} is half a surrogate pair, not a character"),
+            )
+        })
+    }
+
+    fn hex4(&mut self, start: usize) -> Fallible<u32> {
+        let digits = self.text.as_bytes().get(self.at..self.at + 4);
+        let digits = digits.filter(|d| d.iter().all(u8::is_ascii_hexdigit));
+        let code = digits
+            .and_then(|d| std::str::from_utf8(d).ok())
+            .and_then(|d| u32::from_str_radix(d, 16).ok());
+        self.at += 4;
+        code.ok_or((
+            start,
+            "\\u must be followed by four hexadecimal digits".to_string(),
+        ))
+    }
+}

@@ -1,0 +1,526 @@
+//! From checked JSON to the description, and the checks that see more than one value.
+//!
+//! Runs after [`crate::check`]: whatever the tables can say has been checked, so a `None` here means only
+//! that a key was left out.
+
+use std::path::Path;
+
+use indexmap::IndexMap;
+
+use crate::check::{Checker, is_operations, transform};
+use crate::describe::*;
+use crate::error::{Error, Problem};
+use crate::format::{Kind, SCENE, VERSION};
+use crate::json::{Data, Document, Member, Node, quoted};
+use crate::nearest::hint;
+use crate::plugin::{Param, PluginBlock, Value};
+use crate::transform::{Transform, cross, length, parallel, sub};
+
+impl Scene {
+    /// Reads a scene file.
+    pub fn read(file: impl AsRef<Path>) -> Result<Scene, Error> {
+        let file = file.as_ref();
+        let io = |source| Error::Io {
+            file: file.to_path_buf(),
+            source,
+        };
+        let mut bytes = Vec::new();
+        // One byte more than is accepted, so that an endless file (a pipe, /dev/zero) ends, too.
+        let open = std::fs::File::open(file).map_err(io)?;
+        std::io::Read::read_to_end(
+            &mut std::io::Read::take(open, crate::json::MAX_BYTES + 1),
+            &mut bytes,
+        )
+        .map_err(io)?;
+        Scene::parse(&bytes, file)
+    }
+
+    /// Reads a scene from memory. `file` names it in errors, and its folder is where relative paths start.
+    pub fn parse(bytes: &[u8], file: impl AsRef<Path>) -> Result<Scene, Error> {
+        let file = file.as_ref();
+        let doc = Document::parse(bytes)
+            .map_err(|e| Error::Syntax(Problem::new(file, e.place, e.what)))?;
+        check_version(&doc, file)?;
+        let mut checker = Checker::new(&doc, file);
+        checker.check(&doc.root, &Kind::Object(&SCENE));
+        checker.finish().map_err(Error::Invalid)?;
+
+        let mut reader = Reader {
+            checker: Checker::new(&doc, file),
+        };
+        let scene = reader.scene(&doc.root, file);
+        reader.checker.finish().map_err(Error::Invalid)?;
+        scene.ok_or_else(|| {
+            let place = doc.place(&doc.root);
+            Error::Invalid(vec![Problem::new(file, place, "the scene is incomplete")])
+        })
+    }
+}
+
+/// A newer format may differ in anything, so its version is looked at before all else.
+fn check_version(doc: &Document<'_>, file: &Path) -> Result<(), Error> {
+    let Some(node) = doc.root.get("resolvent") else {
+        return Ok(());
+    };
+    match doc.integer(node) {
+        Some(found) if found > i128::from(VERSION) => Err(Error::Unsupported(Problem::new(
+            file,
+            doc.place(node),
+            format!(
+                "the scene has format version {found}, this program reads up to {VERSION}; update the program"
+            ),
+        ))),
+        _ => Ok(()),
+    }
+}
+
+struct Reader<'d> {
+    checker: Checker<'d>,
+}
+
+impl Reader<'_> {
+    fn scene(&mut self, root: &Node, file: &Path) -> Option<Scene> {
+        let scene = Scene {
+            source: Source {
+                file: file.to_path_buf(),
+            },
+            units: root
+                .get("units")
+                .and_then(|n| number(n, "meters_per_unit"))
+                .map_or_else(Units::default, |m| Units { meters_per_unit: m }),
+            camera: self.camera(root.get("camera")?)?,
+            film: root
+                .get("film")
+                .map_or_else(|| Some(Film::default()), |n| self.film(n))?,
+            sampling: root
+                .get("sampling")
+                .map_or_else(|| Some(Sampling::default()), |n| self.sampling(n))?,
+            integrator: match root.get("integrator") {
+                Some(n) => self.block(n)?,
+                None => PluginBlock::new("pt"),
+            },
+            lights: list(root, "lights")
+                .iter()
+                .map(|n| self.light(n))
+                .collect::<Option<_>>()?,
+            materials: named(root, "materials", |n| self.block(n))?,
+            media: named(root, "media", |n| self.medium(n))?,
+            shapes: list(root, "shapes")
+                .iter()
+                .map(|n| self.shape(n))
+                .collect::<Option<_>>()?,
+        };
+        for (node, shape) in list(root, "shapes").iter().zip(&scene.shapes) {
+            self.known(
+                node.get("material"),
+                shape.material.as_deref(),
+                "material",
+                &scene.materials,
+            );
+            self.known(
+                node.get("interior"),
+                shape.interior.as_deref(),
+                "medium",
+                &scene.media,
+            );
+        }
+        Some(scene)
+    }
+
+    /// Reports a name that nothing has.
+    fn known<T>(
+        &mut self,
+        node: Option<&Node>,
+        name: Option<&str>,
+        what: &str,
+        all: &IndexMap<String, T>,
+    ) {
+        if let (Some(node), Some(name)) = (node, name)
+            && !all.contains_key(name)
+        {
+            let hint = hint(name, all.keys().map(String::as_str));
+            self.checker
+                .report(node, format!("no {what} is named {}{hint}", quoted(name)));
+        }
+    }
+
+    fn camera(&mut self, node: &Node) -> Option<Camera> {
+        let lens_radius = number(node, "lens_radius").unwrap_or(0.0);
+        let mut focus_distance = number(node, "focus_distance");
+        let pose = match node.get("transform") {
+            Some(t) => Pose::Transform(transform(t).ok()?),
+            None => {
+                let (origin, target) = (vec3(node, "origin")?, vec3(node, "target")?);
+                let up = vec3(node, "up").unwrap_or([0.0, 1.0, 0.0]);
+                let axis = sub(target, origin);
+                if length(axis) == 0.0 {
+                    self.checker.report(
+                        node.get("target")?,
+                        "expected a target unequal to the origin",
+                    );
+                } else if parallel(axis, up) {
+                    let at = node.get("up").unwrap_or(node);
+                    self.checker.report(
+                        at,
+                        format!(
+                            "expected \"up\" not to be parallel to the viewing axis, found {up:?}"
+                        ),
+                    );
+                }
+                focus_distance = focus_distance.or(Some(length(axis)));
+                Pose::LookAt { origin, target, up }
+            }
+        };
+        if lens_radius > 0.0 && focus_distance.is_none() {
+            self.checker.report(
+                node,
+                "perspective with a lens_radius and a transform needs the key \"focus_distance\"",
+            );
+        }
+        let focus_distance = focus_distance.unwrap_or(1.0);
+        Some(Camera {
+            pose,
+            fov_x_deg: number(node, "fov_x_deg")?,
+            lens_radius,
+            focus_distance,
+        })
+    }
+
+    fn film(&mut self, node: &Node) -> Option<Film> {
+        let resolution: [u32; 2] = self.integers(node.get("resolution")?)?;
+        let crop: Option<[u32; 4]> = node.get("crop").and_then(|n| self.integers(n));
+        if let Some([x0, y0, x1, y1]) = crop
+            && (x0 >= x1 || y0 >= y1 || x1 > resolution[0] || y1 > resolution[1])
+        {
+            let what = format!(
+                "expected x0 < x1 ≤ {} and y0 < y1 ≤ {}, found [{x0}, {y0}, {x1}, {y1}]",
+                resolution[0], resolution[1]
+            );
+            self.checker.report(node.get("crop")?, what);
+        }
+        let filter = node.get("filter").map_or_else(
+            || Some(Filter::default()),
+            |n| {
+                let radius = number(n, "radius");
+                match text(n, "type")? {
+                    "box" => Some(Filter::Box {
+                        radius: radius.unwrap_or(0.5),
+                    }),
+                    "tent" => Some(Filter::Tent {
+                        radius: radius.unwrap_or(1.0),
+                    }),
+                    "gaussian" => Some(Filter::Gaussian {
+                        radius: radius.unwrap_or(1.5),
+                        sigma: number(n, "sigma").unwrap_or(0.5),
+                    }),
+                    _ => None,
+                }
+            },
+        )?;
+        let aovs = list(node, "aovs")
+            .iter()
+            .filter_map(|n| {
+                Aov::ALL
+                    .into_iter()
+                    .find(|a| matches!(&n.data, Data::Text(t) if &**t == a.name()))
+            })
+            .collect();
+        Some(Film {
+            resolution,
+            crop,
+            filter,
+            aovs,
+        })
+    }
+
+    fn sampling(&mut self, node: &Node) -> Option<Sampling> {
+        let mut sampling = Sampling::default();
+        if let Some(spp) = node.get("spp") {
+            sampling.budget = Budget::Spp(self.unsigned(spp)?);
+        } else if let Some(seconds) = number(node, "time") {
+            sampling.budget = Budget::Time(seconds);
+        } else if let Some(error) = number(node, "error") {
+            sampling.budget = Budget::Error(error);
+        }
+        if let Some(seed) = node.get("seed") {
+            sampling.seed = self.unsigned(seed)?;
+        }
+        Some(sampling)
+    }
+
+    fn light(&mut self, node: &Node) -> Option<Light> {
+        Some(match text(node, "type")? {
+            "environment" => Light::Environment(match text(node, "image") {
+                None => Environment::Constant {
+                    radiance: spectrum(node, "radiance")?,
+                },
+                Some(image) => {
+                    let rotation = to_world(node)?;
+                    if let (Some(at), Some(fault)) =
+                        (node.get("transform"), rotation.rotation_fault())
+                    {
+                        self.checker
+                            .report(at, format!("expected a rotation, found {fault}"));
+                    }
+                    let scale = spectrum(node, "scale").unwrap_or([1.0; 3]);
+                    Environment::Image {
+                        file: image.into(),
+                        scale,
+                        rotation,
+                    }
+                }
+            }),
+            "distant" => {
+                let to_light = vec3(node, "to_light")?;
+                if length(to_light) == 0.0 {
+                    self.checker.report(
+                        node.get("to_light")?,
+                        "expected a direction that is not zero, found [0, 0, 0]",
+                    );
+                }
+                let angle_deg = number(node, "angle_deg").unwrap_or(0.0);
+                Light::Distant {
+                    to_light,
+                    irradiance: spectrum(node, "irradiance")?,
+                    angle_deg,
+                }
+            }
+            "point" => Light::Point {
+                position: vec3(node, "position")?,
+                intensity: spectrum(node, "intensity")?,
+            },
+            "rectangle" => {
+                let [corner, edge_u, edge_v] = self.rectangle(node)?;
+                let two_sided = matches!(
+                    node.get("two_sided"),
+                    Some(Node {
+                        data: Data::Bool(true),
+                        ..
+                    })
+                );
+                Light::Rectangle {
+                    corner,
+                    edge_u,
+                    edge_v,
+                    radiance: spectrum(node, "radiance")?,
+                    two_sided,
+                }
+            }
+            _ => return None,
+        })
+    }
+
+    fn rectangle(&mut self, node: &Node) -> Option<[Vec3; 3]> {
+        let (edge_u, edge_v) = (vec3(node, "edge_u")?, vec3(node, "edge_v")?);
+        if length(cross(edge_u, edge_v)) == 0.0 || parallel(edge_u, edge_v) {
+            let what =
+                format!("expected two edges that span an area, found {edge_u:?} and {edge_v:?}");
+            self.checker.report(node, what);
+        }
+        Some([vec3(node, "corner")?, edge_u, edge_v])
+    }
+
+    fn medium(&mut self, node: &Node) -> Option<Medium> {
+        Some(Medium {
+            block: self.block(node)?,
+            transform: to_world(node)?,
+        })
+    }
+
+    fn shape(&mut self, node: &Node) -> Option<Shape> {
+        let geometry = match text(node, "type")? {
+            "sphere" => Geometry::Sphere {
+                center: vec3(node, "center")?,
+                radius: number(node, "radius")?,
+            },
+            "rectangle" => {
+                let [corner, edge_u, edge_v] = self.rectangle(node)?;
+                Geometry::Rectangle {
+                    corner,
+                    edge_u,
+                    edge_v,
+                }
+            }
+            "mesh" => Geometry::Mesh(self.mesh(node)?),
+            "ply" => Geometry::Ply {
+                file: text(node, "file")?.into(),
+                transform: to_world(node)?,
+            },
+            _ => return None,
+        };
+        Some(Shape {
+            geometry,
+            material: text(node, "material").map(String::from),
+            emission: spectrum(node, "emission"),
+            interior: text(node, "interior").map(String::from),
+        })
+    }
+
+    fn mesh(&mut self, node: &Node) -> Option<Mesh> {
+        let mesh = Mesh {
+            positions: list(node, "positions")
+                .iter()
+                .map(floats)
+                .collect::<Option<_>>()?,
+            indices: list(node, "indices")
+                .iter()
+                .map(|n| self.integers(n))
+                .collect::<Option<_>>()?,
+            normals: list(node, "normals")
+                .iter()
+                .map(floats)
+                .collect::<Option<_>>()?,
+            uvs: list(node, "uvs")
+                .iter()
+                .map(floats)
+                .collect::<Option<_>>()?,
+            transform: to_world(node)?,
+        };
+        let corners = mesh.positions.len();
+        if mesh.indices.is_empty() {
+            self.checker
+                .report(node.get("indices")?, "expected at least one triangle");
+        }
+        for (triangle, at) in mesh.indices.iter().zip(list(node, "indices")) {
+            if let Some(i) = triangle.iter().find(|i| **i as usize >= corners) {
+                self.checker.report(
+                    at,
+                    format!(
+                        "expected indices below {corners} (the number of positions), found {i}"
+                    ),
+                );
+            }
+        }
+        for (key, count) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
+            if let Some(at) = node.get(key)
+                && count != corners
+            {
+                self.checker.report(
+                    at,
+                    format!("expected one per position ({corners}), found {count}"),
+                );
+            }
+        }
+        Some(mesh)
+    }
+
+    fn block(&mut self, node: &Node) -> Option<PluginBlock> {
+        let params = match node.get("params").map(|n| &n.data) {
+            Some(Data::Object(members)) => members
+                .iter()
+                .map(|m| self.param(m))
+                .collect::<Option<_>>()?,
+            _ => IndexMap::new(),
+        };
+        Some(PluginBlock {
+            plugin: text(node, "plugin")?.into(),
+            params,
+            place: self.checker.doc.place(node),
+        })
+    }
+
+    fn param(&mut self, member: &Member) -> Option<(String, Param)> {
+        let place = self.checker.doc.place(&member.value);
+        Some((
+            member.key.to_string(),
+            Param {
+                value: self.value(&member.value)?,
+                place,
+            },
+        ))
+    }
+
+    fn value(&mut self, node: &Node) -> Option<Value> {
+        Some(match &node.data {
+            Data::Null => return None,
+            Data::Bool(b) => Value::Bool(*b),
+            Data::Number(x) => Value::Number(*x),
+            Data::Text(t) => Value::Text(t.to_string()),
+            Data::List(items) if is_operations(items) => Value::from(transform(node).ok()?),
+            Data::List(items) => {
+                Value::List(items.iter().map(|n| self.value(n)).collect::<Option<_>>()?)
+            }
+            Data::Object(_) => Value::Object(self.block(node)?),
+        })
+    }
+
+    fn unsigned(&self, node: &Node) -> Option<u64> {
+        self.checker.doc.integer(node)?.try_into().ok()
+    }
+
+    fn integers<const N: usize>(&self, node: &Node) -> Option<[u32; N]> {
+        let Data::List(items) = &node.data else {
+            return None;
+        };
+        let all: Option<Vec<u32>> = items
+            .iter()
+            .map(|n| self.unsigned(n)?.try_into().ok())
+            .collect();
+        all?.try_into().ok()
+    }
+}
+
+fn named<T>(
+    node: &Node,
+    key: &str,
+    mut read: impl FnMut(&Node) -> Option<T>,
+) -> Option<IndexMap<String, T>> {
+    match node.get(key).map(|n| &n.data) {
+        Some(Data::Object(members)) => members
+            .iter()
+            .map(|m| Some((m.key.to_string(), read(&m.value)?)))
+            .collect(),
+        _ => Some(IndexMap::new()),
+    }
+}
+
+fn list<'n>(node: &'n Node, key: &str) -> &'n [Node] {
+    match node.get(key).map(|n| &n.data) {
+        Some(Data::List(items)) => items,
+        _ => &[],
+    }
+}
+
+fn number(node: &Node, key: &str) -> Option<f64> {
+    match node.get(key)?.data {
+        Data::Number(x) => Some(x),
+        _ => None,
+    }
+}
+
+fn text<'n>(node: &'n Node, key: &str) -> Option<&'n str> {
+    match &node.get(key)?.data {
+        Data::Text(t) => Some(t),
+        _ => None,
+    }
+}
+
+fn floats<const N: usize>(node: &Node) -> Option<[f64; N]> {
+    let Data::List(items) = &node.data else {
+        return None;
+    };
+    let all: Option<Vec<f64>> = items
+        .iter()
+        .map(|n| match n.data {
+            Data::Number(x) => Some(x),
+            _ => None,
+        })
+        .collect();
+    all?.try_into().ok()
+}
+
+fn vec3(node: &Node, key: &str) -> Option<Vec3> {
+    floats(node.get(key)?)
+}
+
+fn spectrum(node: &Node, key: &str) -> Option<Vec3> {
+    number(node, key)
+        .map(|x| [x; 3])
+        .or_else(|| vec3(node, key))
+}
+
+/// The transform of a shape, medium or environment; the identity if there is none.
+fn to_world(node: &Node) -> Option<Transform> {
+    node.get("transform")
+        .map_or(Some(Transform::IDENTITY), |n| transform(n).ok())
+}

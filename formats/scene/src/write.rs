@@ -1,0 +1,384 @@
+//! From the description back to JSON.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::{Map, Value as Json, json};
+
+use crate::declare::{ParamKind, PluginDecl};
+use crate::describe::*;
+use crate::error::Error;
+use crate::format::VERSION;
+use crate::plugin::{PluginBlock, Value};
+use crate::transform::Transform;
+
+impl Scene {
+    /// The scene as JSON text that reads as an equal scene. A description that breaks the format's rules,
+    /// such as a radiance that is not finite, is an error: [`Error::Invalid`], with places in the text
+    /// that would have been written.
+    pub fn to_text(&self) -> Result<String, Error> {
+        let mut text = String::new();
+        pretty(&self.to_json(), 0, &mut text);
+        text.push('\n');
+        // Reading it back checks a description built in memory by the same rules as a file.
+        Scene::parse(text.as_bytes(), &self.source.file)?;
+        Ok(text)
+    }
+
+    /// Writes the scene to a file. Relative paths keep their meaning only if [`Scene::rebase`] has been
+    /// called for the file's folder, or if it is the folder of [`Scene::source`].
+    pub fn write(&self, file: impl AsRef<Path>) -> Result<(), Error> {
+        let file = file.as_ref();
+        let text = self.to_text()?;
+        std::fs::write(file, text).map_err(|source| Error::Io {
+            file: file.to_path_buf(),
+            source,
+        })
+    }
+
+    /// Makes the scene one that stands in `file`: relative paths are rewritten so that they lead to the
+    /// same files from its folder. `decls` tell which parameters of plugins are paths.
+    pub fn rebase(&mut self, file: impl Into<PathBuf>, decls: &[PluginDecl]) -> Result<(), Error> {
+        let file = file.into();
+        let io = |source| Error::Io {
+            file: file.clone(),
+            source,
+        };
+        let from = std::path::absolute(if self.base().as_os_str().is_empty() {
+            Path::new(".")
+        } else {
+            self.base()
+        });
+        let to = std::path::absolute(&file);
+        let rebase = Rebase {
+            from: from.map_err(io)?,
+            to: to.map_err(io)?,
+            decls,
+        };
+        for light in &mut self.lights {
+            if let Light::Environment(Environment::Image { file, .. }) = light {
+                rebase.path(file);
+            }
+        }
+        for shape in &mut self.shapes {
+            if let Geometry::Ply { file, .. } = &mut shape.geometry {
+                rebase.path(file);
+            }
+        }
+        rebase.block(&mut self.integrator);
+        self.materials
+            .values_mut()
+            .for_each(|block| rebase.block(block));
+        self.media
+            .values_mut()
+            .for_each(|medium| rebase.block(&mut medium.block));
+        self.source = Source { file };
+        Ok(())
+    }
+
+    fn to_json(&self) -> Json {
+        let mut root = json!({"resolvent": VERSION});
+        if self.units != Units::default() {
+            root["units"] = json!({"meters_per_unit": self.units.meters_per_unit});
+        }
+        root["camera"] = camera(&self.camera);
+        root["film"] = film(&self.film);
+        root["sampling"] = sampling(&self.sampling);
+        root["integrator"] = block(&self.integrator);
+        root["lights"] = self.lights.iter().map(light).collect();
+        root["materials"] = Json::Object(
+            self.materials
+                .iter()
+                .map(|(name, b)| (name.clone(), block(b)))
+                .collect(),
+        );
+        root["media"] = Json::Object(
+            self.media
+                .iter()
+                .map(|(name, m)| (name.clone(), medium(m)))
+                .collect(),
+        );
+        root["shapes"] = self.shapes.iter().map(shape).collect();
+        root
+    }
+}
+
+struct Rebase<'a> {
+    from: PathBuf,
+    to: PathBuf,
+    decls: &'a [PluginDecl],
+}
+
+impl Rebase<'_> {
+    fn path(&self, path: &mut String) {
+        if Path::new(path.as_str()).is_relative() {
+            let target = self.from.join(path.as_str());
+            let target = match self
+                .to
+                .parent()
+                .and_then(|folder| target.strip_prefix(folder).ok())
+            {
+                Some(below) => below.to_path_buf(),
+                None => target,
+            };
+            // Both parts came from text or from the system's own idea of the current folder.
+            *path = target.to_string_lossy().into_owned();
+        }
+    }
+
+    fn block(&self, block: &mut PluginBlock) {
+        if block.is_path() {
+            self.path(&mut block.plugin);
+        }
+        let name = block.plugin.as_str();
+        let files: Vec<&str> = self
+            .decls
+            .iter()
+            .filter(|d| d.name == name)
+            .flat_map(|d| &d.params)
+            .filter(|p| p.kind == ParamKind::File)
+            .map(|p| p.name.as_str())
+            .collect();
+        for (key, param) in &mut block.params {
+            match &mut param.value {
+                Value::Text(t) if files.contains(&key.as_str()) => self.path(t),
+                Value::Object(nested) => self.block(nested),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// A spectrum as short as it can be.
+fn spectrum(s: Vec3) -> Json {
+    if s[0] == s[1] && s[1] == s[2] {
+        json!(s[0])
+    } else {
+        json!(s)
+    }
+}
+
+/// Adds a transform that is not the identity.
+fn put_transform(out: &mut Json, t: &Transform) {
+    if *t != Transform::IDENTITY {
+        out["transform"] = json!(t.0);
+    }
+}
+
+fn camera(c: &Camera) -> Json {
+    let mut out = json!({"type": "perspective"});
+    match &c.pose {
+        Pose::LookAt { origin, target, up } => {
+            out["origin"] = json!(origin);
+            out["target"] = json!(target);
+            out["up"] = json!(up);
+        }
+        Pose::Transform(t) => out["transform"] = json!(t.0),
+    }
+    out["fov_x_deg"] = json!(c.fov_x_deg);
+    out["lens_radius"] = json!(c.lens_radius);
+    out["focus_distance"] = json!(c.focus_distance);
+    out
+}
+
+fn film(f: &Film) -> Json {
+    let mut out = json!({"resolution": f.resolution});
+    if let Some(crop) = f.crop {
+        out["crop"] = json!(crop);
+    }
+    out["filter"] = match f.filter {
+        Filter::Box { radius } => json!({"type": "box", "radius": radius}),
+        Filter::Tent { radius } => json!({"type": "tent", "radius": radius}),
+        Filter::Gaussian { radius, sigma } => {
+            json!({"type": "gaussian", "radius": radius, "sigma": sigma})
+        }
+    };
+    if !f.aovs.is_empty() {
+        out["aovs"] = f.aovs.iter().map(|a| a.name()).collect();
+    }
+    out
+}
+
+fn sampling(s: &Sampling) -> Json {
+    let mut out = match s.budget {
+        Budget::Spp(n) => json!({"spp": n}),
+        Budget::Time(t) => json!({"time": t}),
+        Budget::Error(e) => json!({"error": e}),
+    };
+    out["seed"] = json!(s.seed);
+    out
+}
+
+fn light(l: &Light) -> Json {
+    match l {
+        Light::Environment(Environment::Constant { radiance }) => {
+            json!({"type": "environment", "radiance": spectrum(*radiance)})
+        }
+        Light::Environment(Environment::Image {
+            file,
+            scale,
+            rotation,
+        }) => {
+            let mut out = json!({"type": "environment", "image": file, "scale": spectrum(*scale)});
+            put_transform(&mut out, rotation);
+            out
+        }
+        Light::Distant {
+            to_light,
+            irradiance,
+            angle_deg,
+        } => {
+            json!({"type": "distant", "to_light": to_light, "irradiance": spectrum(*irradiance), "angle_deg": angle_deg})
+        }
+        Light::Point {
+            position,
+            intensity,
+        } => {
+            json!({"type": "point", "position": position, "intensity": spectrum(*intensity)})
+        }
+        Light::Rectangle {
+            corner,
+            edge_u,
+            edge_v,
+            radiance,
+            two_sided,
+        } => json!({
+            "type": "rectangle", "corner": corner, "edge_u": edge_u, "edge_v": edge_v,
+            "radiance": spectrum(*radiance), "two_sided": two_sided,
+        }),
+    }
+}
+
+fn block(b: &PluginBlock) -> Json {
+    let mut out = json!({"plugin": b.plugin});
+    if !b.params.is_empty() {
+        let params: Map<_, _> = b
+            .params
+            .iter()
+            .map(|(name, p)| (name.clone(), value(&p.value)))
+            .collect();
+        out["params"] = Json::Object(params);
+    }
+    out
+}
+
+pub(crate) fn value(v: &Value) -> Json {
+    match v {
+        Value::Bool(b) => json!(b),
+        Value::Number(x) => json!(x),
+        Value::Text(t) => json!(t),
+        Value::List(items) => items.iter().map(value).collect(),
+        Value::Object(b) => block(b),
+    }
+}
+
+fn medium(m: &Medium) -> Json {
+    let mut out = block(&m.block);
+    put_transform(&mut out, &m.transform);
+    out
+}
+
+fn shape(s: &Shape) -> Json {
+    let mut out = match &s.geometry {
+        Geometry::Sphere { center, radius } => {
+            json!({"type": "sphere", "center": center, "radius": radius})
+        }
+        Geometry::Rectangle {
+            corner,
+            edge_u,
+            edge_v,
+        } => {
+            json!({"type": "rectangle", "corner": corner, "edge_u": edge_u, "edge_v": edge_v})
+        }
+        Geometry::Mesh(m) => {
+            let mut out = json!({"type": "mesh", "positions": m.positions, "indices": m.indices});
+            if !m.normals.is_empty() {
+                out["normals"] = json!(m.normals);
+            }
+            if !m.uvs.is_empty() {
+                out["uvs"] = json!(m.uvs);
+            }
+            put_transform(&mut out, &m.transform);
+            out
+        }
+        Geometry::Ply { file, transform } => {
+            let mut out = json!({"type": "ply", "file": file});
+            put_transform(&mut out, transform);
+            out
+        }
+    };
+    if let Some(material) = &s.material {
+        out["material"] = json!(material);
+    }
+    if let Some(emission) = s.emission {
+        out["emission"] = spectrum(emission);
+    }
+    if let Some(interior) = &s.interior {
+        out["interior"] = json!(interior);
+    }
+    out
+}
+
+/// Writes with two spaces of indentation, and on one line what fits on one.
+pub(crate) fn pretty(json: &Json, indent: usize, out: &mut String) {
+    const WIDTH: usize = 96;
+    let flat_size = match json {
+        Json::Array(items) => items.len(),
+        Json::Object(members) => members.len(),
+        _ => 0,
+    };
+    // Few enough members to possibly fit: without this, every level of a large mesh would be written flat.
+    if flat_size * 2 <= WIDTH && indent > 0 || flat_size == 0 {
+        let flat = flat(json);
+        if flat.len() + indent <= WIDTH || flat_size == 0 {
+            out.push_str(&flat);
+            return;
+        }
+    }
+    let inner = indent + 2;
+    let line = |out: &mut String, at: usize| {
+        out.push('\n');
+        out.extend(std::iter::repeat_n(' ', at));
+    };
+    match json {
+        Json::Array(items) => {
+            out.push('[');
+            for (i, item) in items.iter().enumerate() {
+                out.push_str(if i > 0 { "," } else { "" });
+                line(out, inner);
+                pretty(item, inner, out);
+            }
+            line(out, indent);
+            out.push(']');
+        }
+        Json::Object(members) => {
+            out.push('{');
+            for (i, (key, item)) in members.iter().enumerate() {
+                out.push_str(if i > 0 { "," } else { "" });
+                line(out, inner);
+                out.push_str(&Json::from(key.as_str()).to_string());
+                out.push_str(": ");
+                pretty(item, inner, out);
+            }
+            line(out, indent);
+            out.push('}');
+        }
+        scalar => out.push_str(&scalar.to_string()),
+    }
+}
+
+/// On one line, with a space after commas and colons.
+fn flat(json: &Json) -> String {
+    match json {
+        Json::Array(items) => format!(
+            "[{}]",
+            items.iter().map(flat).collect::<Vec<_>>().join(", ")
+        ),
+        Json::Object(members) => {
+            let parts = members
+                .iter()
+                .map(|(k, v)| format!("{}: {}", Json::from(k.as_str()), flat(v)));
+            format!("{{{}}}", parts.collect::<Vec<_>>().join(", "))
+        }
+        scalar => scalar.to_string(),
+    }
+}
