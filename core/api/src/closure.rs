@@ -1,0 +1,112 @@
+//! A scattering closure: K at one vertex, resolved by its plugin and stored inline.
+
+use crate::abi::{ScatterTable, Status};
+use crate::math::Vec3;
+use crate::operator::{Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample};
+
+/// Bytes a closure may occupy.
+pub const CLOSURE_BYTES: usize = 240;
+
+/// The data of a `Scatter` implementation together with the table of its functions.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct Closure {
+    table: *const ScatterTable,
+    data: [u64; CLOSURE_BYTES / 8],
+}
+
+// SAFETY: the table is a static of a library that is never unloaded, and the data is that of a type the SDK bounds
+// by `Copy + Send + Sync + 'static`.
+unsafe impl Send for Closure {}
+// SAFETY: as above.
+unsafe impl Sync for Closure {}
+
+impl Closure {
+    /// Absorbs everything.
+    pub const EMPTY: Self = Self {
+        table: core::ptr::null(),
+        data: [0; CLOSURE_BYTES / 8],
+    };
+
+    /// Stores `value` with its table into `out`. Checked at compile time: it must fit in size and alignment.
+    ///
+    /// # Safety
+    /// `table` must be the table made for `C` by the SDK, `out` valid for writing.
+    pub unsafe fn store<C: Copy + 'static>(out: *mut Self, table: *const ScatterTable, value: C) {
+        const {
+            assert!(
+                size_of::<C>() <= CLOSURE_BYTES,
+                "a closure may occupy at most 240 bytes"
+            )
+        };
+        const {
+            assert!(
+                align_of::<C>() <= 8,
+                "a closure may be aligned to at most 8 bytes"
+            )
+        };
+        // SAFETY: `out` is valid for writing by contract; size and alignment are asserted above. Only the bytes
+        // in use are written: the rest keeps whatever it held and is never read.
+        unsafe {
+            (*out).table = table;
+            (&raw mut (*out).data).cast::<C>().write(value);
+        }
+    }
+
+    /// Checked evaluation; `None` if the plugin failed (its error is then with the host).
+    #[inline(always)]
+    pub fn try_eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> Option<ScatterEval> {
+        let mut out = ScatterEval::default();
+        if self.table.is_null() {
+            return Some(out);
+        }
+        let (wo, wi) = (wo.to_array(), wi.to_array());
+        // SAFETY: table and data were written together by `store`, or by a C plugin under the same contract.
+        let status = unsafe {
+            ((*self.table).eval)(
+                (&raw const self.data).cast(),
+                &wo,
+                &wi,
+                mode as u32,
+                &mut out,
+            )
+        };
+        (status == Status::OK).then_some(out)
+    }
+}
+
+impl Scatter for Closure {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> ScatterEval {
+        self.try_eval(wo, wi, mode).unwrap_or_default()
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u: ScatterDraws, mode: Mode) -> Option<ScatterSample> {
+        if self.table.is_null() {
+            return None;
+        }
+        let mut out = ScatterSample::default();
+        let wo = wo.to_array();
+        // SAFETY: as in `try_eval`.
+        let status = unsafe {
+            ((*self.table).sample)(
+                (&raw const self.data).cast(),
+                &wo,
+                &u,
+                mode as u32,
+                &mut out,
+            )
+        };
+        (status == Status::OK).then_some(out)
+    }
+
+    #[inline(always)]
+    fn lobes(&self) -> u32 {
+        if self.table.is_null() {
+            return 0;
+        }
+        // SAFETY: as in `try_eval`.
+        unsafe { ((*self.table).lobes)((&raw const self.data).cast()) }
+    }
+}

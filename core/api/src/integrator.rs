@@ -1,0 +1,189 @@
+//! Integrators: the trait of their plugins and the scene as they see it.
+
+use crate::abi::{OutputTable, PixelSample, SceneTable, Status, Tile, scene_traits};
+use crate::math::Vec3;
+use crate::operator::FlightDraws;
+use crate::spectrum::Spectrum;
+use crate::vertex::{CameraRay, Edge, LightSample, Vertex};
+
+/// A host call failed (a plugin broke, or the render was stopped); return it at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopped;
+
+/// What a host call came to.
+pub type Outcome<T> = Result<T, Stopped>;
+
+/// An integrator plugin.
+pub trait Integrator: Send + Sync + 'static {
+    /// Renders a piece of work into `out`. What it adds must depend on the tile and the scene alone.
+    fn render(&self, scene: &SceneView<'_>, tile: &Tile, out: &mut Output<'_>) -> Outcome<()>;
+}
+
+/// G for a whole scene: how vertices are linked.
+pub trait Transport {
+    /// The next vertex from `from` in direction `wi`. `false`: the light is lost (the edge's emission counts even then).
+    fn propagate(
+        &self,
+        from: &Vertex,
+        wi: Vec3,
+        u: &FlightDraws,
+        edge: &mut Edge,
+        next: &mut Vertex,
+    ) -> Outcome<bool>;
+    /// Connects `from` to a point on a light; `None` if occluded.
+    fn connect(&self, from: &Vertex, to: &LightSample, u: &FlightDraws) -> Outcome<Option<Edge>>;
+}
+
+/// The scene.
+#[derive(Clone, Copy)]
+pub struct SceneView<'a> {
+    table: &'a SceneTable,
+}
+
+#[inline(always)]
+fn found(status: Status) -> Outcome<bool> {
+    match status {
+        Status::OK => Ok(true),
+        Status::NONE => Ok(false),
+        _ => Err(Stopped),
+    }
+}
+
+impl<'a> SceneView<'a> {
+    /// A view of the host's table.
+    ///
+    /// # Safety
+    /// The table must be a complete one of this ABI version, valid for `'a`.
+    pub unsafe fn new(table: &'a SceneTable) -> Self {
+        Self { table }
+    }
+
+    /// True if the scene has all of these [`scene_traits`].
+    #[inline(always)]
+    pub fn has(&self, traits: u32) -> bool {
+        self.table.traits & traits == traits
+    }
+
+    /// True if a grey kernel is enough: no medium tells lanes apart.
+    pub fn is_grey(&self) -> bool {
+        !self.has(scene_traits::CHROMATIC_MEDIA)
+    }
+
+    /// Lanes in use.
+    #[inline(always)]
+    pub fn lanes(&self) -> u32 {
+        self.table.lanes
+    }
+
+    /// The camera's ray through `film` (pixels) and `lens` (unit square).
+    #[inline(always)]
+    pub fn camera_ray(&self, film: [f32; 2], lens: [f32; 2]) -> Outcome<Option<CameraRay>> {
+        let mut ray = CameraRay::default();
+        // SAFETY: the table is valid (contract of `new`), pointers live for the call.
+        let status = unsafe { (self.table.camera_ray)(self.table.ctx, &film, &lens, &mut ray) };
+        Ok(found(status)?.then_some(ray))
+    }
+
+    /// G from the sensor.
+    #[inline(always)]
+    pub fn emerge(
+        &self,
+        ray: &CameraRay,
+        u: &FlightDraws,
+        edge: &mut Edge,
+        next: &mut Vertex,
+    ) -> Outcome<bool> {
+        // SAFETY: as above.
+        found(unsafe { (self.table.emerge)(self.table.ctx, ray, u, edge, next) })
+    }
+
+    /// Chooses a point on a light for `reference`; `None` if nothing can be connected.
+    #[inline(always)]
+    pub fn sample_light(
+        &self,
+        reference: &Vertex,
+        choice: f32,
+        point: [f32; 2],
+    ) -> Outcome<Option<LightSample>> {
+        let mut out = core::mem::MaybeUninit::<LightSample>::uninit();
+        // SAFETY: as above; the host fills `out` completely when it returns OK.
+        unsafe {
+            let status = (self.table.sample_light)(
+                self.table.ctx,
+                reference,
+                choice,
+                &point,
+                out.as_mut_ptr(),
+            );
+            Ok(found(status)?.then(|| out.assume_init()))
+        }
+    }
+
+    /// Density (sr⁻¹) with which [`SceneView::sample_light`] at `reference` finds `emitter`.
+    #[inline(always)]
+    pub fn light_density(&self, reference: &Vertex, emitter: &Vertex) -> f32 {
+        // SAFETY: as above.
+        unsafe { (self.table.light_density)(self.table.ctx, reference, emitter) }
+    }
+
+    /// Approximate transmittance towards a light, visibility not tested.
+    #[inline(always)]
+    pub fn approximate(&self, from: &Vertex, to: &LightSample) -> Outcome<Spectrum> {
+        let mut out = Spectrum::ZERO;
+        // SAFETY: as above.
+        found(unsafe { (self.table.approximate)(self.table.ctx, from, to, &mut out) })?;
+        Ok(out)
+    }
+}
+
+impl Transport for SceneView<'_> {
+    #[inline(always)]
+    fn propagate(
+        &self,
+        from: &Vertex,
+        wi: Vec3,
+        u: &FlightDraws,
+        edge: &mut Edge,
+        next: &mut Vertex,
+    ) -> Outcome<bool> {
+        // SAFETY: as above.
+        found(unsafe {
+            (self.table.propagate)(self.table.ctx, from, &wi.to_array(), u, edge, next)
+        })
+    }
+
+    #[inline(always)]
+    fn connect(&self, from: &Vertex, to: &LightSample, u: &FlightDraws) -> Outcome<Option<Edge>> {
+        let mut edge = Edge::default();
+        // SAFETY: as above.
+        let status = unsafe { (self.table.connect)(self.table.ctx, from, to, u, &mut edge) };
+        Ok(found(status)?.then_some(edge))
+    }
+}
+
+/// Where samples go.
+pub struct Output<'a> {
+    table: &'a OutputTable,
+}
+
+impl<'a> Output<'a> {
+    /// # Safety
+    /// The table must be a complete one of this ABI version, valid for `'a`.
+    pub unsafe fn new(table: &'a OutputTable) -> Self {
+        Self { table }
+    }
+
+    /// Adds one sample of pixel (x, y); the samples of a pixel come in order.
+    #[inline(always)]
+    pub fn add(&mut self, x: u32, y: u32, sample: &PixelSample) -> Outcome<()> {
+        // SAFETY: the table is valid (contract of `new`), pointers live for the call.
+        found(unsafe { (self.table.add)(self.table.ctx, x, y, sample) }).map(|_| ())
+    }
+
+    /// Adds light to the film at a position in pixels.
+    #[inline(always)]
+    pub fn splat(&mut self, film: [f32; 2], radiance: Spectrum) -> Outcome<()> {
+        // SAFETY: as above.
+        found(unsafe { (self.table.splat)(self.table.ctx, &film, &radiance) }).map(|_| ())
+    }
+}

@@ -1,0 +1,133 @@
+//! Free flight by delta tracking (Woodcock et al. 1965) with local majorants, minorants and lane densities.
+
+use super::{Draws, STALLS, finish, rescale};
+use crate::medium::Field;
+use crate::operator::{Event, Flight, FlightDraws, Segment, flight_flags};
+use crate::rng::exponential;
+use crate::spectrum::{Lanes, Spectrum};
+
+/// Samples the next collision on a segment.
+///
+/// The hero lane decides distances and events; the other lanes carry the ratios of what their densities would have
+/// been (Miller et al. 2019; spectral MIS over lanes as in Wilkie et al. 2014). `RATIO` says whether connections
+/// are estimated by ratio tracking, whose density is then carried along; otherwise it equals `track`.
+pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &FlightDraws) -> Flight {
+    let mut out = Flight::vacuum(s.t1);
+    let Some(mut cursor) = field.enter(s) else {
+        return out;
+    };
+    let mut draws = Draws::new(u);
+    let zero = F::Lanes::splat(0.0);
+    let (mut value, mut ratio) = (F::Lanes::splat(1.0), F::Lanes::splat(1.0));
+    // Logarithms relative to the hero lane's density, which is the common scale.
+    let (mut log_value, mut log_ratio) = (zero, zero);
+    let mut tau = exponential(u.tau);
+    let mut stalls = 0;
+
+    'flight: while let Some(cell) = field.next_cell(&mut cursor) {
+        let (majorant, minorant) = (cell.majorant, cell.minorant);
+        let hero = majorant.lane(u.hero);
+        let sure = minorant.lane(u.hero);
+        let mut t = cell.t0;
+        loop {
+            let step = tau / hero;
+            let leaves = !(t + step < cell.t1);
+            let end = if leaves { cell.t1 } else { t + step };
+            let dt = end - t;
+            if F::EMISSIVE {
+                let position = draws.next();
+                // One point on the step, weighted by the chance that lane and step came to be (track-length estimator:
+                // reaching the point already has the probability of the transmittance).
+                let at = t + position.0[1] * dt;
+                let emission = field.emission(&mut cursor, at);
+                out.emitted += emission
+                    * lane_weight::<F>(value, log_value, majorant, hero, at - t, u.lanes)
+                    * dt;
+            }
+            if F::Lanes::CHROMATIC {
+                log_value = log_value - (majorant - F::Lanes::splat(hero)) * dt;
+            }
+            if RATIO {
+                log_ratio = log_ratio - (majorant - minorant - F::Lanes::splat(hero)) * dt;
+            }
+            if leaves {
+                tau = if hero > 0.0 {
+                    (tau - dt * hero).max(0.0)
+                } else {
+                    tau
+                };
+                break;
+            }
+            if end == t {
+                stalls += 1;
+                if stalls > STALLS {
+                    stalls = 0;
+                    t = t.next_up();
+                    if !(t < cell.t1) {
+                        break;
+                    }
+                }
+            } else {
+                t = end;
+            }
+            let ([event, next], jitter) = draws.next();
+            tau = exponential(next);
+            let mark = event * hero;
+            let known = if mark < sure {
+                None
+            } else {
+                out.lookups += 1;
+                let sigma = field.extinction(&mut cursor, t, jitter);
+                let sigma_hero = sigma.lane(u.hero);
+                if sigma_hero > hero * 1.000_01 {
+                    out.violations += 1;
+                }
+                if mark >= sigma_hero {
+                    out.nulls += 1;
+                    let null = hero - sigma_hero;
+                    if F::Lanes::CHROMATIC {
+                        value = value * ((majorant - sigma) / F::Lanes::splat(null));
+                    }
+                    if RATIO {
+                        ratio = ratio * ((majorant - minorant) / F::Lanes::splat(null));
+                    }
+                    if F::Lanes::CHROMATIC || RATIO {
+                        rescale(&mut value, &mut ratio);
+                    }
+                    continue;
+                }
+                Some(sigma)
+            };
+            let exact = u.flags & flight_flags::EXACT != 0;
+            (out.sigma_t, out.sigma_s) = field.collision(&mut cursor, t, known, exact);
+            out.t = t;
+            out.event = Event::Collided as u32;
+            break 'flight;
+        }
+    }
+    if F::Lanes::CHROMATIC || RATIO {
+        let (v, r) = finish(value, log_value, ratio, log_ratio);
+        out.value = v;
+        out.track = v;
+        out.ratio = if RATIO { r } else { v };
+    }
+    out
+}
+
+/// Weight of what is picked up at a distance `dt` into a step: the lanes' contributions over their mean density.
+#[inline(always)]
+fn lane_weight<F: Field>(
+    value: F::Lanes,
+    log_value: F::Lanes,
+    majorant: F::Lanes,
+    hero: f32,
+    dt: f32,
+    lanes: u32,
+) -> Spectrum {
+    if !F::Lanes::CHROMATIC {
+        return Spectrum::ONE;
+    }
+    let log = log_value - (majorant - F::Lanes::splat(hero)) * dt;
+    let density = value * (log - F::Lanes::splat(log.max_lane())).exp();
+    (density / F::Lanes::splat(density.mean(lanes))).spectrum()
+}

@@ -1,0 +1,69 @@
+//! Tracking: free flight and transmittance over a [`Field`], compiled once per field inside its plugin.
+//!
+//! Null points on a ray form a Poisson process of the rate of the majorant. [`delta`] samples the next collision,
+//! [`ratio`] estimates a transmittance. Both use a minorant where the field knows one: a collision below the minorant is
+//! accepted without a look-up, and a transmittance keeps the minorant's part in closed form (the residual and decomposition
+//! tracking of Novák et al. 2014 and Kutz et al. 2017). Where minorant and majorant meet, both become exact regular
+//! tracking of constant cells, without any look-up.
+
+pub mod delta;
+pub mod ratio;
+mod tracked;
+
+pub use tracked::{Tracked, Transmittance};
+
+/// Random numbers of one flight: the primary ones first, then the tail of the key.
+pub(crate) struct Draws {
+    stream: crate::rng::Stream,
+    event: Option<f32>,
+}
+
+impl Draws {
+    pub(crate) fn new(u: &crate::FlightDraws) -> Self {
+        Self {
+            stream: crate::rng::Stream::new(u.key),
+            event: Some(u.event),
+        }
+    }
+
+    /// Uniforms for a decision and for the next distance, and bits for a stochastic look-up.
+    #[inline(always)]
+    pub(crate) fn next(&mut self) -> ([f32; 2], u64) {
+        let [event, tau] = self.stream.uniform2();
+        (
+            [self.event.take().unwrap_or(event), tau],
+            self.stream.bits() >> 1,
+        )
+    }
+}
+
+/// Steps below the resolution of `t` that may follow each other before `t` is moved on by one ulp. A majorant so large
+/// that `t + Δt = t` would otherwise never leave the spot.
+pub(crate) const STALLS: u32 = 64;
+
+/// Keeps products of many factors inside the range of `f32`; their common scale means nothing.
+#[inline(always)]
+pub(crate) fn rescale<L: crate::Lanes>(a: &mut L, b: &mut L) {
+    let top = a.max_lane().max(b.max_lane());
+    if !(1e-15..=1e15).contains(&top) && top > 0.0 {
+        let scale = if top > 1.0 { 1e-15 } else { 1e15 };
+        *a = *a * scale;
+        *b = *b * scale;
+    }
+}
+
+/// `a·exp(log_a)` and `b·exp(log_b)` up to a common factor that keeps the larger exponent at zero.
+#[inline(always)]
+pub(crate) fn finish<L: crate::Lanes>(
+    a: L,
+    log_a: L,
+    b: L,
+    log_b: L,
+) -> (crate::Spectrum, crate::Spectrum) {
+    let top = log_a.max_lane().max(log_b.max_lane());
+    let shift = L::splat(top);
+    (
+        (a * (log_a - shift).exp()).spectrum(),
+        (b * (log_b - shift).exp()).spectrum(),
+    )
+}
