@@ -36,14 +36,19 @@ impl<'d> Checker<'d> {
         }
     }
 
+    /// True if further problems are dropped, and need not be worded.
+    pub fn is_full(&self) -> bool {
+        self.problems.len() >= MAX_PROBLEMS
+    }
+
     pub fn report(&mut self, node: &Node, what: impl Into<String>) {
-        if self.problems.len() < MAX_PROBLEMS {
+        if !self.is_full() {
             self.report_at(self.doc.place(node), what);
         }
     }
 
     fn report_at(&mut self, place: Place, what: impl Into<String>) {
-        if self.problems.len() < MAX_PROBLEMS {
+        if !self.is_full() {
             self.problems.push(Problem::new(self.file, place, what));
         }
     }
@@ -213,7 +218,7 @@ impl<'d> Checker<'d> {
         for member in members {
             match object.fields.iter().find(|f| f.name == &*member.key) {
                 Some(field) => self.check(&member.value, &field.kind),
-                None if variant && &*member.key == "type" => {}
+                None if self.is_full() || (variant && &*member.key == "type") => {}
                 None => {
                     let names = object.fields.iter().map(|f| f.name);
                     let what = format!(

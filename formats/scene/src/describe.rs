@@ -3,6 +3,7 @@
 //! Lengths are in scene units, directions need not be normalised, radiometric values are linear RGB
 //! in SI units (`[f64; 3]`). A single number in a file stands for three equal ones.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use indexmap::IndexMap;
@@ -66,15 +67,15 @@ impl Scene {
 
     /// The media that fill space by their own bounds: those which are no shape's interior.
     pub fn free_standing(&self) -> impl Iterator<Item = (&str, &Medium)> {
+        let interiors: HashSet<&str> = self
+            .shapes
+            .iter()
+            .filter_map(|s| s.interior.as_deref())
+            .collect();
         self.media
             .iter()
-            .filter(|(name, _)| {
-                !self
-                    .shapes
-                    .iter()
-                    .any(|s| s.interior.as_deref() == Some(name.as_str()))
-            })
             .map(|(name, medium)| (name.as_str(), medium))
+            .filter(move |(name, _)| !interiors.contains(name))
     }
 }
 

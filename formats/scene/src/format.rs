@@ -295,10 +295,10 @@ static FILM: Object = Object {
     name: "film",
     help: "Resolution and what is recorded",
     fields: &[
-        need(
+        may(
             "resolution",
             Kind::Integers(2, 1, 65_536),
-            "Width and height in pixels",
+            "Width and height in pixels ([1280, 720])",
         ),
         may(
             "crop",

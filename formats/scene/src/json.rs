@@ -12,7 +12,16 @@ use crate::error::Place;
 pub(crate) const MAX_DEPTH: usize = 64;
 
 /// The largest text that is read, in bytes. Larger meshes belong into PLY files.
-pub(crate) const MAX_BYTES: u64 = 256 << 20;
+///
+/// A list of one-digit numbers takes 32 bytes in memory per two bytes of text: this bounds it to 1 GiB.
+pub(crate) const MAX_BYTES: u64 = 64 << 20;
+
+/// Longer paths are shown by their beginning and end: a place is kept for every parameter of a plugin,
+/// and must stay small whatever the keys are.
+const MAX_PATH: usize = 300;
+
+/// Distance in bytes between the offsets whose count of characters is remembered.
+const BLOCK: usize = 512;
 
 /// One JSON value and the byte offset of its first character.
 #[derive(Debug)]
@@ -76,6 +85,9 @@ pub(crate) fn quoted(text: &str) -> String {
 pub(crate) struct Document<'t> {
     text: &'t str,
     line_starts: Vec<u32>,
+    /// Number of characters before each multiple of [`BLOCK`] bytes, so that columns cost no scan of
+    /// their whole line, which may be the whole text.
+    chars_before: Vec<u32>,
     pub root: Node,
 }
 
@@ -121,30 +133,13 @@ impl<'t> Document<'t> {
             parser.at = '\u{feff}'.len_utf8();
         }
         let root = parser.document();
-        let line_starts = std::iter::once(0)
-            .chain(
-                text.bytes()
-                    .enumerate()
-                    .filter(|(_, b)| *b == b'\n')
-                    .map(|(i, _)| i as u32 + 1),
-            )
-            .collect();
+        let mut document = Document::index(text);
         match root {
-            Ok(root) => Ok(Document {
-                text,
-                line_starts,
-                root,
-            }),
+            Ok(root) => {
+                document.root = root;
+                Ok(document)
+            }
             Err((at, what)) => {
-                let null = Node {
-                    start: 0,
-                    data: Data::Null,
-                };
-                let document = Document {
-                    text,
-                    line_starts,
-                    root: null,
-                };
                 let (line, column) = document.line_column(at);
                 Err(SyntaxError {
                     place: Place::new("$".into(), line, column),
@@ -154,18 +149,53 @@ impl<'t> Document<'t> {
         }
     }
 
+    /// Lines and characters of a text, without its values.
+    fn index(text: &str) -> Document<'_> {
+        let mut line_starts = vec![0];
+        let mut chars_before = Vec::with_capacity(text.len() / BLOCK + 1);
+        let mut chars = 0;
+        for (i, byte) in text.bytes().enumerate() {
+            if i % BLOCK == 0 {
+                chars_before.push(chars);
+            }
+            chars += u32::from(starts_char(byte));
+            if byte == b'\n' {
+                line_starts.push(i as u32 + 1);
+            }
+        }
+        let root = Node {
+            start: 0,
+            data: Data::Null,
+        };
+        Document {
+            text,
+            line_starts,
+            chars_before,
+            root,
+        }
+    }
+
+    /// Number of characters that start before an offset.
+    fn chars_to(&self, offset: usize) -> usize {
+        let offset = offset.min(self.text.len());
+        let block = offset / BLOCK;
+        let before = self.chars_before.get(block).map_or(0, |n| *n as usize);
+        let rest = &self.text.as_bytes()[block * BLOCK..offset];
+        before + rest.iter().filter(|b| starts_char(**b)).count()
+    }
+
     fn line_column(&self, offset: usize) -> (usize, usize) {
         let line = self
             .line_starts
             .partition_point(|s| *s as usize <= offset)
             .max(1);
         let start = self.line_starts[line - 1] as usize;
-        let column = self
-            .text
-            .get(start..offset)
-            .map_or(0, |t| t.chars().count())
-            + 1;
-        (line, column)
+        // No editor counts the byte-order mark as a column.
+        let mark = usize::from(line == 1 && offset > 0 && self.text.starts_with('\u{feff}'));
+        (
+            line,
+            self.chars_to(offset) - self.chars_to(start) + 1 - mark,
+        )
     }
 
     /// Path, line and column of a value of this document.
@@ -209,6 +239,11 @@ impl<'t> Document<'t> {
                 None => break,
             }
         }
+        if path.len() > MAX_PATH {
+            let head: String = path.chars().take(MAX_PATH / 4).collect();
+            let tail: Vec<char> = path.chars().rev().take(MAX_PATH / 4).collect();
+            path = head + "…" + &tail.into_iter().rev().collect::<String>();
+        }
         let (line, column) = self.line_column(shown.unwrap_or(start) as usize);
         Place::new(path, line, column)
     }
@@ -231,6 +266,7 @@ impl<'t> Document<'t> {
 /// One step of a JSON path: `.key`, or `["odd key"]`.
 pub(crate) fn key_step(key: &str) -> String {
     let plain = !key.is_empty()
+        && key.len() <= MAX_PATH
         && key
             .chars()
             .all(|c| c.is_alphanumeric() || c == '_' || c == '-');
@@ -239,6 +275,10 @@ pub(crate) fn key_step(key: &str) -> String {
     } else {
         format!("[{}]", quoted(key))
     }
+}
+
+fn starts_char(byte: u8) -> bool {
+    byte & 0xc0 != 0x80
 }
 
 type Fallible<T> = Result<T, (usize, String)>;

@@ -47,6 +47,7 @@ impl Scene {
 
         let mut reader = Reader {
             checker: Checker::new(&doc, file),
+            params: 0,
         };
         let scene = reader.scene(&doc.root, file);
         reader.checker.finish().map_err(Error::Invalid)?;
@@ -74,8 +75,13 @@ fn check_version(doc: &Document<'_>, file: &Path) -> Result<(), Error> {
     }
 }
 
+/// Most parameters and nested plugins of one scene: each keeps its place, so they cost much more memory
+/// than text.
+const MAX_PARAMS: usize = 200_000;
+
 struct Reader<'d> {
     checker: Checker<'d>,
+    params: usize,
 }
 
 impl Reader<'_> {
@@ -137,6 +143,7 @@ impl Reader<'_> {
     ) {
         if let (Some(node), Some(name)) = (node, name)
             && !all.contains_key(name)
+            && !self.checker.is_full()
         {
             let hint = hint(name, all.keys().map(String::as_str));
             self.checker
@@ -187,7 +194,10 @@ impl Reader<'_> {
     }
 
     fn film(&mut self, node: &Node) -> Option<Film> {
-        let resolution: [u32; 2] = self.integers(node.get("resolution")?)?;
+        let resolution: [u32; 2] = match node.get("resolution") {
+            Some(n) => self.integers(n)?,
+            None => Film::default().resolution,
+        };
         let crop: Option<[u32; 4]> = node.get("crop").and_then(|n| self.integers(n));
         if let Some([x0, y0, x1, y1]) = crop
             && (x0 >= x1 || y0 >= y1 || x1 > resolution[0] || y1 > resolution[1])
@@ -420,6 +430,7 @@ impl Reader<'_> {
     }
 
     fn param(&mut self, member: &Member) -> Option<(String, Param)> {
+        self.count(&member.value)?;
         let place = self.checker.doc.place(&member.value);
         Some((
             member.key.to_string(),
@@ -428,6 +439,16 @@ impl Reader<'_> {
                 place,
             },
         ))
+    }
+
+    /// Counts what keeps a place; nothing once there are too many.
+    fn count(&mut self, node: &Node) -> Option<()> {
+        self.params += 1;
+        if self.params == MAX_PARAMS {
+            let what = format!("more than {MAX_PARAMS} plugin parameters in one scene");
+            self.checker.report(node, what);
+        }
+        (self.params < MAX_PARAMS).then_some(())
     }
 
     fn value(&mut self, node: &Node) -> Option<Value> {
@@ -440,7 +461,10 @@ impl Reader<'_> {
             Data::List(items) => {
                 Value::List(items.iter().map(|n| self.value(n)).collect::<Option<_>>()?)
             }
-            Data::Object(_) => Value::Object(self.block(node)?),
+            Data::Object(_) => {
+                self.count(node)?;
+                Value::Object(self.block(node)?)
+            }
         })
     }
 
