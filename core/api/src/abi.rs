@@ -397,7 +397,7 @@ pub mod scene_traits {
     pub const SURFACES: u32 = 1;
     /// Has media.
     pub const MEDIA: u32 = 2;
-    /// Some medium's extinction or albedo differs between lanes.
+    /// Some medium's extinction differs between lanes.
     pub const CHROMATIC_MEDIA: u32 = 4;
     /// Some medium emits.
     pub const EMISSIVE_MEDIA: u32 = 8;

@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 pub mod medium_traits {
     /// Coefficients are the same everywhere inside.
     pub const HOMOGENEOUS: u32 = 1;
-    /// Extinction and albedo are the same in all lanes.
+    /// Extinction is the same in all lanes (the albedo may differ).
     pub const GREY: u32 = 2;
     /// Emits.
     pub const EMISSIVE: u32 = 4;

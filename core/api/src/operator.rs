@@ -149,6 +149,9 @@ pub struct FlightDraws {
     pub flags: u32,
     /// Zero.
     pub reserved: u32,
+    /// The path's density up to here, per lane, up to a common factor: what is picked up on the way is weighted by the mean
+    /// of `prior · track` over lanes, so that one hero serves the whole path. All ones in grey scenes.
+    pub prior: Spectrum,
 }
 
 /// Bits of [`FlightDraws::flags`].

@@ -40,9 +40,8 @@ pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &Flig
                 // reaching the point already has the probability of the transmittance).
                 let at = t + position.0[1] * dt;
                 let emission = field.emission(&mut cursor, at);
-                out.emitted += emission
-                    * lane_weight::<F>(value, log_value, majorant, hero, at - t, u.lanes)
-                    * dt;
+                let weight = lane_weight::<F>(value, log_value, majorant, hero, at - t, u);
+                out.emitted += emission * weight * dt;
             }
             if F::Lanes::CHROMATIC {
                 log_value = log_value - (majorant - F::Lanes::splat(hero)) * dt;
@@ -122,12 +121,12 @@ fn lane_weight<F: Field>(
     majorant: F::Lanes,
     hero: f32,
     dt: f32,
-    lanes: u32,
+    u: &FlightDraws,
 ) -> Spectrum {
     if !F::Lanes::CHROMATIC {
         return Spectrum::ONE;
     }
     let log = log_value - (majorant - F::Lanes::splat(hero)) * dt;
-    let density = value * (log - F::Lanes::splat(log.max_lane())).exp();
-    (density / F::Lanes::splat(density.mean(lanes))).spectrum()
+    let reached = (value * (log - F::Lanes::splat(log.max_lane())).exp()).spectrum();
+    reached / (reached * u.prior).mean(u.lanes)
 }

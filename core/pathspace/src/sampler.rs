@@ -1,0 +1,162 @@
+//! The primary samples of a path: Owen-scrambled Sobol' for the first bounces, hashed numbers beyond.
+//!
+//! Samples come in batches of [`BATCH`]; a batch is a randomised net of its own, so batches are independent and their spread
+//! is an honest estimate of the error. Every number is a function of (seed, pixel, sample, bounce, purpose) alone.
+
+use crate::sobol;
+use resolvent_api::rng::{derive, mix, unit};
+use resolvent_api::{FlightDraws, ScatterDraws, Spectrum};
+
+pub use crate::sobol::BATCH;
+
+/// Bounces whose decisions use the net. Later ones gain nothing from it (their integrand has too many dimensions).
+const NET_BOUNCES: u32 = 2;
+
+/// What a group of numbers is for.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Camera = 0,
+    Flight = 1,
+    Scatter = 2,
+    Light = 3,
+    Connection = 4,
+}
+
+/// The numbers of one sample of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct Sampler {
+    batch_key: u64,
+    sample_key: u64,
+    index: u32,
+    lanes: u32,
+    hero: u32,
+}
+
+impl Sampler {
+    /// The numbers of sample `sample` of pixel `pixel` of the image `seed`, for `lanes` lanes in use.
+    #[inline(always)]
+    pub fn new(seed: u64, pixel: u64, sample: u32, lanes: u32) -> Self {
+        let pixel_key = derive(mix(seed ^ 0x5eed), pixel);
+        let batch_key = derive(pixel_key, (sample / BATCH) as u64);
+        let sample_key = derive(batch_key, 0x1000 + (sample % BATCH) as u64);
+        // One lane after the other from a random start: within a batch every lane leads about equally often.
+        let hero = (((batch_key >> 40) as u32).wrapping_add(sample % BATCH)) % lanes;
+        Self {
+            batch_key,
+            sample_key,
+            index: sample % BATCH,
+            lanes,
+            hero,
+        }
+    }
+
+    #[inline(always)]
+    fn four(&self, bounce: u32, purpose: Purpose) -> [f32; 4] {
+        let dimension = (bounce * 8 + purpose as u32) as u64;
+        if bounce < NET_BOUNCES {
+            sobol::point(self.index, derive(self.batch_key, 0x2000 + dimension)).map(unit)
+        } else {
+            let a = derive(self.sample_key, dimension);
+            let b = mix(a.wrapping_add(0x9e37_79b9_7f4a_7c15));
+            [
+                unit((a >> 32) as u32),
+                unit(a as u32),
+                unit((b >> 32) as u32),
+                unit(b as u32),
+            ]
+        }
+    }
+
+    /// Film offset within the pixel and lens position.
+    #[inline(always)]
+    pub fn camera(&self) -> ([f32; 2], [f32; 2]) {
+        let [a, b, c, d] = self.four(0, Purpose::Camera);
+        ([a, b], [c, d])
+    }
+
+    /// A free flight; `prior` is the path's density per lane.
+    #[inline(always)]
+    pub fn flight(&self, bounce: u32, prior: Spectrum) -> FlightDraws {
+        self.draws(bounce, Purpose::Flight, prior)
+    }
+
+    /// The transmittance of a connection.
+    #[inline(always)]
+    pub fn connection(&self, bounce: u32, prior: Spectrum) -> FlightDraws {
+        self.draws(bounce, Purpose::Connection, prior)
+    }
+
+    #[inline(always)]
+    fn draws(&self, bounce: u32, purpose: Purpose, prior: Spectrum) -> FlightDraws {
+        let [tau, event, ..] = self.four(bounce, purpose);
+        FlightDraws {
+            key: derive(
+                self.sample_key,
+                0x4000_0000 + (bounce * 8 + purpose as u32) as u64,
+            ),
+            tau,
+            event,
+            hero: self.hero,
+            lanes: self.lanes,
+            flags: 0,
+            reserved: 0,
+            prior,
+        }
+    }
+
+    /// A scattering decision, and a number for the roulette before it.
+    #[inline(always)]
+    pub fn scatter(&self, bounce: u32) -> (ScatterDraws, f32) {
+        let [a, b, c, d] = self.four(bounce, Purpose::Scatter);
+        (
+            ScatterDraws {
+                lobe: c,
+                dir: [a, b],
+            },
+            d,
+        )
+    }
+
+    /// Choice of a light, a point on it, and a number for the roulette of the connection.
+    #[inline(always)]
+    pub fn light(&self, bounce: u32) -> (f32, [f32; 2], f32) {
+        let [a, b, c, d] = self.four(bounce, Purpose::Light);
+        (c, [a, b], d)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_repeat_and_differ() {
+        let a = Sampler::new(7, 123, 45, 3);
+        let b = Sampler::new(7, 123, 45, 3);
+        let c = Sampler::new(7, 124, 45, 3);
+        assert_eq!(a.light(3), b.light(3));
+        assert_ne!(a.light(3), c.light(3));
+        assert_ne!(a.camera(), c.camera());
+        assert_ne!(
+            a.flight(0, Spectrum::ONE).key,
+            a.connection(0, Spectrum::ONE).key
+        );
+    }
+
+    /// Every lane leads equally often.
+    #[test]
+    fn heroes_are_uniform() {
+        let n = 30_000;
+        let mut count = [0u32; 3];
+        for sample in 0..n {
+            count[Sampler::new(1, 9, sample, 3).flight(0, Spectrum::ONE).hero as usize] += 1;
+        }
+        for c in count {
+            let expected = n as f64 / 3.0;
+            assert!(
+                (c as f64 - expected).abs() < 5.0 * (expected * 2.0 / 3.0).sqrt(),
+                "{count:?}"
+            );
+        }
+    }
+}
