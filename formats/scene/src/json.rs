@@ -163,6 +163,8 @@ impl<'t> Document<'t> {
                 line_starts.push(i as u32 + 1);
             }
         }
+        // The end of the text is a place, too, and may be the start of a block.
+        chars_before.push(chars);
         let root = Node {
             start: 0,
             data: Data::Null,
