@@ -469,6 +469,10 @@ pub struct SceneTable {
         to: *const LightSample,
         out: *mut Spectrum,
     ) -> Status,
+    /// Reports that the scattering closure of a vertex panicked or gave a value that is not finite: the host names its plugin
+    /// and ends the render.
+    pub fault:
+        unsafe extern "C" fn(ctx: *const c_void, vertex: *const Vertex, message: Text) -> Status,
     /// Connects a vertex to a point on a light. [`Status::NONE`] if it is occluded.
     pub connect: unsafe extern "C" fn(
         ctx: *const c_void,

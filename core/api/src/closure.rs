@@ -53,12 +53,12 @@ impl Closure {
         }
     }
 
-    /// Checked evaluation; `None` if the plugin failed (its error is then with the host).
+    /// Evaluation with the outcome: `Err` if the plugin panicked.
     #[inline(always)]
-    pub fn try_eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> Option<ScatterEval> {
+    pub fn try_eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> Result<ScatterEval, Status> {
         let mut out = ScatterEval::default();
         if self.table.is_null() {
-            return Some(out);
+            return Ok(out);
         }
         let (wo, wi) = (wo.to_array(), wi.to_array());
         // SAFETY: table and data were written together by `store`, or by a C plugin under the same contract.
@@ -71,20 +71,23 @@ impl Closure {
                 &mut out,
             )
         };
-        (status == Status::OK).then_some(out)
-    }
-}
-
-impl Scatter for Closure {
-    #[inline(always)]
-    fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> ScatterEval {
-        self.try_eval(wo, wi, mode).unwrap_or_default()
+        if status == Status::OK {
+            Ok(out)
+        } else {
+            Err(status)
+        }
     }
 
+    /// Sampling with the outcome: `Ok(None)` if absorbed, `Err` if the plugin panicked.
     #[inline(always)]
-    fn sample(&self, wo: Vec3, u: ScatterDraws, mode: Mode) -> Option<ScatterSample> {
+    pub fn try_sample(
+        &self,
+        wo: Vec3,
+        u: ScatterDraws,
+        mode: Mode,
+    ) -> Result<Option<ScatterSample>, Status> {
         if self.table.is_null() {
-            return None;
+            return Ok(None);
         }
         let mut out = ScatterSample::default();
         let wo = wo.to_array();
@@ -98,7 +101,24 @@ impl Scatter for Closure {
                 &mut out,
             )
         };
-        (status == Status::OK).then_some(out)
+        match status {
+            Status::OK => Ok(Some(out)),
+            Status::NONE => Ok(None),
+            other => Err(other),
+        }
+    }
+}
+
+/// Treats a panic as absorption; use the `try_` functions where it must not pass unseen.
+impl Scatter for Closure {
+    #[inline(always)]
+    fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> ScatterEval {
+        self.try_eval(wo, wi, mode).unwrap_or_default()
+    }
+
+    #[inline(always)]
+    fn sample(&self, wo: Vec3, u: ScatterDraws, mode: Mode) -> Option<ScatterSample> {
+        self.try_sample(wo, u, mode).ok().flatten()
     }
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! Integrators: the trait of their plugins and the scene as they see it.
 
-use crate::abi::{OutputTable, PixelSample, SceneTable, Status, Tile, scene_traits};
+use crate::abi::{OutputTable, PixelSample, SceneTable, Status, Text, Tile, scene_traits};
 use crate::math::Vec3;
 use crate::operator::FlightDraws;
 use crate::spectrum::Spectrum;
@@ -124,6 +124,14 @@ impl<'a> SceneView<'a> {
     pub fn light_density(&self, reference: &Vertex, emitter: &Vertex) -> f32 {
         // SAFETY: as above.
         unsafe { (self.table.light_density)(self.table.ctx, reference, emitter) }
+    }
+
+    /// Reports a broken closure of `vertex`; the render ends with an error that names its plugin.
+    #[cold]
+    pub fn fault(&self, vertex: &Vertex, message: &str) -> Stopped {
+        // SAFETY: as above.
+        unsafe { (self.table.fault)(self.table.ctx, vertex, Text::new(message)) };
+        Stopped
     }
 
     /// Approximate transmittance towards a light, visibility not tested.

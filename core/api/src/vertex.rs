@@ -45,11 +45,13 @@ pub struct Vertex {
     /// Position, or for [`vertex_flags::INFINITE`] the direction towards it.
     pub p: Float3,
     /// Bound of the absolute rounding error in each coordinate of `p`.
-    pub p_error: f32,
-    /// Geometric normal (surfaces; unit).
-    pub ng: Float3,
+    pub p_error: Float3,
     /// The light this vertex lies on, or [`NONE`].
     pub light: u32,
+    /// Geometric normal (surfaces; unit).
+    pub ng: Float3,
+    /// Zero.
+    pub reserved: u32,
     /// Unit direction towards the previous vertex.
     pub wo: Float3,
     /// The medium that scatters here (medium vertices), or [`NONE`].
@@ -80,9 +82,10 @@ impl Vertex {
             kind: 0,
             flags: 0,
             p: [0.0; 3],
-            p_error: 0.0,
-            ng: [0.0; 3],
+            p_error: [0.0; 3],
             light: NONE,
+            ng: [0.0; 3],
+            reserved: 0,
             wo: [0.0; 3],
             medium: NONE,
             frame: Frame {
@@ -171,9 +174,7 @@ pub struct LightSample {
     /// Surface and primitive, so that connections don't stop at the light itself: private to the host.
     pub primitive: [u32; 2],
     /// Rounding error of `p`.
-    pub p_error: f32,
-    /// Zero.
-    pub reserved: u32,
+    pub p_error: Float3,
 }
 
 /// A camera ray.

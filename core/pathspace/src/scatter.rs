@@ -1,6 +1,7 @@
 //! K at a vertex: frames, cosines and the corrections that keep transport symmetric, applied here and nowhere else.
 
-use resolvent_api::operator::{Measure, Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample};
+use resolvent_api::integrator::{Outcome, SceneView};
+use resolvent_api::operator::{Measure, Mode, ScatterDraws, ScatterEval, ScatterSample};
 use resolvent_api::{Vec3, Vertex, VertexKind};
 
 /// f̄·D towards `wi`: the BSDF times |ns·wi|, or the phase function, with the densities per steradian.
@@ -8,33 +9,63 @@ use resolvent_api::{Vec3, Vertex, VertexKind};
 /// In radiance mode the shading normal's cosine replaces the geometric one. In importance mode the BSDF is the
 /// adjoint, which carries |wo·ns| |wi·ng| / (|wo·ng| |wi·ns|) (Veach 1997, eq. 5.19). σ_s of a medium vertex is not part of it:
 /// it belongs to the collision.
+///
+/// # Errors
+/// If the plugin panicked or its value is not finite: the render ends, the plugin is named.
 #[inline(always)]
-pub fn eval(v: &Vertex, wi: Vec3, mode: Mode) -> ScatterEval {
+pub fn eval(scene: &SceneView<'_>, v: &Vertex, wi: Vec3, mode: Mode) -> Outcome<ScatterEval> {
     let wo = Vec3::from(v.wo);
-    if !v.is(VertexKind::Surface) {
-        return v.scatter.eval(wo, wi, mode);
-    }
-    let Some(correction) = correction(v, wo, wi, mode) else {
-        return ScatterEval::default();
+    let e = if v.is(VertexKind::Surface) {
+        let Some(correction) = correction(v, wo, wi, mode) else {
+            return Ok(ScatterEval::default());
+        };
+        let (lo, li) = (v.frame.to_local(wo), v.frame.to_local(wi));
+        v.scatter.try_eval(lo, li, mode).map(|mut e| {
+            e.f *= correction * li.z.abs();
+            e
+        })
+    } else {
+        v.scatter.try_eval(wo, wi, mode)
     };
-    let (lo, li) = (v.frame.to_local(wo), v.frame.to_local(wi));
-    let mut e = v.scatter.eval(lo, li, mode);
-    e.f *= correction * li.z.abs();
-    e
+    match e {
+        Ok(e) if e.f.is_finite() && e.forward.is_finite() && e.reverse.is_finite() => Ok(e),
+        Ok(e) => Err(scene.fault(v, &format!("eval gave a value that is not finite: {e:?}"))),
+        Err(_) => Err(scene.fault(v, "panicked in eval")),
+    }
 }
 
 /// Samples `wi`; the weight is f̄·D/density. Directions are in world coordinates.
+///
+/// # Errors
+/// As [`eval`].
 #[inline(always)]
-pub fn sample(v: &Vertex, u: ScatterDraws, mode: Mode) -> Option<ScatterSample> {
+pub fn sample(
+    scene: &SceneView<'_>,
+    v: &Vertex,
+    u: ScatterDraws,
+    mode: Mode,
+) -> Outcome<Option<ScatterSample>> {
     let wo = Vec3::from(v.wo);
-    if !v.is(VertexKind::Surface) {
-        return v.scatter.sample(wo, u, mode);
+    let surface = v.is(VertexKind::Surface);
+    let local = if surface { v.frame.to_local(wo) } else { wo };
+    let mut s = match v.scatter.try_sample(local, u, mode) {
+        Ok(Some(s)) => s,
+        Ok(None) => return Ok(None),
+        Err(_) => return Err(scene.fault(v, "panicked in sample")),
+    };
+    let good = s.weight.is_finite() && Vec3::from(s.wi).is_finite() && s.forward.is_finite();
+    if !good {
+        return Err(scene.fault(v, &format!("sample gave a value that is not finite: {s:?}")));
     }
-    let mut s = v.scatter.sample(v.frame.to_local(wo), u, mode)?;
-    let wi = v.frame.to_world(s.wi.into()).normalize();
-    s.weight *= correction(v, wo, wi, mode)?;
-    s.wi = wi.into();
-    Some(s)
+    if surface {
+        let wi = v.frame.to_world(s.wi.into()).normalize();
+        let Some(correction) = correction(v, wo, wi, mode) else {
+            return Ok(None);
+        };
+        s.weight *= correction;
+        s.wi = wi.into();
+    }
+    Ok(Some(s))
 }
 
 /// True if the sample's density is a probability, not a density per steradian.
