@@ -1,0 +1,238 @@
+//! From primitive boxes to the eight-wide hierarchy.
+//!
+//! obvhs makes a binary hierarchy (PLOC with reinsertion); [`super::collapse`] finds the cheapest eight-wide one in it; this
+//! file lays that out. obvhs sees boxes moved to the origin and scaled to unit size, since it panics on huge coordinates and
+//! its costs would over- or underflow; the boxes that rays meet come from the primitives again.
+
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+
+use super::bvh8::{Bounds, Child, Node8};
+use super::collapse::{Plan, Step};
+use super::input::Geometry;
+use super::sphere::{self, Ball};
+use super::traverse::{MAX_DEPTH, Tree};
+use super::triangle::{self, LANES, Packet};
+
+/// Deeper than this, subtrees are split evenly by count instead of by cost: eleven more levels hold 2³³ primitives, so that the
+/// depth stays below [`MAX_DEPTH`] whatever the input.
+const MAX_COST_DEPTH: usize = MAX_DEPTH - 12;
+
+/// A primitive that takes part: triangles with equal vertices do not.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Primitive {
+    pub bounds: Bounds,
+    /// Number among all primitives of the geometry.
+    pub number: u32,
+    pub item: Item,
+}
+
+/// What a primitive is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Item {
+    Triangle([[f32; 3]; 3]),
+    Ball(Ball),
+}
+
+impl Primitive {
+    pub fn is_ball(&self) -> bool {
+        matches!(self.item, Item::Ball(_))
+    }
+}
+
+/// The primitives that can be hit, in order, and how many triangles were left out for having equal vertices.
+pub(super) fn primitives(geometry: &Geometry) -> (Vec<Primitive>, usize) {
+    let mut out = Vec::with_capacity(geometry.primitives());
+    let mut degenerate = 0;
+    let mut number = 0;
+    for shape in &geometry.shapes {
+        if let super::input::Shape::Sphere(s) = shape {
+            let item = Item::Ball(Ball {
+                center: s.center.to_array(),
+                radius: s.radius,
+                prim: number,
+            });
+            out.push(Primitive {
+                bounds: sphere::bounds(s),
+                number,
+                item,
+            });
+            number += 1;
+            continue;
+        }
+        for prim in 0..shape.primitives() as u32 {
+            if let Some(vertices) = shape.triangle(prim) {
+                let vertices = vertices.map(|v| v.to_array());
+                if distinct(&vertices) {
+                    let bounds = triangle::bounds(&vertices);
+                    out.push(Primitive {
+                        bounds,
+                        number,
+                        item: Item::Triangle(vertices),
+                    });
+                } else {
+                    degenerate += 1;
+                }
+            }
+            number += 1;
+        }
+    }
+    (out, degenerate)
+}
+
+/// Whether all three vertices differ. A triangle with two equal vertices can be left out, since its neighbours meet along its
+/// other two edges, which are one. A triangle with three different vertices on a line has no area either, but has to stay: its
+/// neighbours' edges need not coincide once they are rounded, and it covers the gap.
+fn distinct([a, b, c]: &[[f32; 3]; 3]) -> bool {
+    a != b && b != c && c != a
+}
+
+/// The hierarchy over `primitives`; `None` if there are none.
+pub(super) fn build(primitives: &[Primitive]) -> Option<Tree> {
+    if primitives.is_empty() {
+        return None;
+    }
+    let binary = build_binary(primitives);
+    let plan = Plan::new(&binary, |i| primitives[i as usize].is_ball());
+    let mut layout = Layout {
+        primitives,
+        binary: &binary,
+        plan: &plan,
+        tree: Tree {
+            nodes: Vec::with_capacity(primitives.len() / 6 + 1),
+            packets: Vec::with_capacity(primitives.len() / 3 + 1),
+            balls: Vec::new(),
+            depth: 0,
+        },
+    };
+    let steps = if plan.is_leaf(0) {
+        vec![Step::Leaf(0)]
+    } else {
+        plan.children(&binary, 0)
+    };
+    layout.node(&steps, 1);
+    let mut tree = layout.tree;
+    tree.nodes.shrink_to_fit();
+    tree.packets.shrink_to_fit();
+    Some(tree)
+}
+
+fn build_binary(primitives: &[Primitive]) -> Bvh2 {
+    let mut all = Bounds::EMPTY;
+    for p in primitives {
+        all.include(&p.bounds);
+    }
+    let center = [0, 1, 2].map(|i| 0.5 * (f64::from(all.min[i]) + f64::from(all.max[i])));
+    let extent = (0..3)
+        .map(|i| f64::from(all.max[i]) - f64::from(all.min[i]))
+        .fold(0.0, f64::max);
+    let scale = 1.0 / extent;
+    let unit = |p: [f32; 3]| {
+        glam::Vec3A::from_array([0, 1, 2].map(|i| ((f64::from(p[i]) - center[i]) * scale) as f32))
+    };
+    let boxes: Vec<Aabb> = primitives
+        .iter()
+        .map(|p| Aabb::new(unit(p.bounds.min), unit(p.bounds.max)))
+        .collect();
+    let indices = (0..boxes.len() as u32).collect();
+    // The crate's "medium" preset without its collapse, which the plan replaces.
+    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
+        PlocSearchDistance::Medium,
+        &boxes,
+        indices,
+        SortPrecision::U64,
+        3,
+    );
+    ReinsertionOptimizer::default().run(&mut binary, REINSERTION, None);
+    binary
+}
+
+/// Share of the binary nodes that reinsertion tries to place better in its first pass.
+const REINSERTION: f32 = 0.05;
+
+struct Layout<'a> {
+    primitives: &'a [Primitive],
+    binary: &'a Bvh2,
+    plan: &'a Plan,
+    tree: Tree,
+}
+
+impl Layout<'_> {
+    /// Appends a node with these children, then their subtrees, depth first. Returns its index and box.
+    fn node(&mut self, steps: &[Step], depth: usize) -> (Child, Bounds) {
+        self.tree.depth = self.tree.depth.max(depth);
+        let index = self.tree.nodes.len();
+        self.tree.nodes.push(Node8::EMPTY);
+        let mut all = Bounds::EMPTY;
+        for (lane, &step) in steps.iter().enumerate() {
+            let (child, bounds) = match step {
+                Step::Leaf(n) => {
+                    let prims = self.plan.subtree(self.binary, n);
+                    self.leaf(&prims)
+                }
+                Step::Inner(n) if depth < MAX_COST_DEPTH => {
+                    let steps = self.plan.children(self.binary, n);
+                    self.node(&steps, depth + 1)
+                }
+                Step::Inner(n) => {
+                    let prims = self.plan.subtree(self.binary, n);
+                    self.balanced(&prims, depth + 1)
+                }
+            };
+            self.tree.nodes[index].set(lane, &bounds, child);
+            all.include(&bounds);
+        }
+        (Child::node(index), all)
+    }
+
+    /// Appends a subtree over `prims` that is split evenly by count.
+    fn balanced(&mut self, prims: &[u32], depth: usize) -> (Child, Bounds) {
+        let same_kind = |p: &[u32]| {
+            p.iter().all(|&i| {
+                self.primitives[i as usize].is_ball() == self.primitives[p[0] as usize].is_ball()
+            })
+        };
+        if prims.len() <= LANES && same_kind(prims) {
+            return self.leaf(prims);
+        }
+        self.tree.depth = self.tree.depth.max(depth);
+        let index = self.tree.nodes.len();
+        self.tree.nodes.push(Node8::EMPTY);
+        let mut all = Bounds::EMPTY;
+        for (lane, part) in prims.chunks(prims.len().div_ceil(8)).enumerate() {
+            let (child, bounds) = self.balanced(part, depth + 1);
+            self.tree.nodes[index].set(lane, &bounds, child);
+            all.include(&bounds);
+        }
+        (Child::node(index), all)
+    }
+
+    /// Appends a leaf with `prims`, which are of one kind.
+    fn leaf(&mut self, prims: &[u32]) -> (Child, Bounds) {
+        let mut bounds = Bounds::EMPTY;
+        let (packets, balls) = (self.tree.packets.len(), self.tree.balls.len());
+        for (i, &p) in prims.iter().enumerate() {
+            let p = &self.primitives[p as usize];
+            bounds.include(&p.bounds);
+            match p.item {
+                Item::Ball(ball) => self.tree.balls.push(ball),
+                Item::Triangle(vertices) => {
+                    if i % LANES == 0 {
+                        self.tree.packets.push(Packet::EMPTY);
+                    }
+                    if let Some(packet) = self.tree.packets.last_mut() {
+                        packet.set(i % LANES, vertices, p.number);
+                    }
+                }
+            }
+        }
+        let child = if self.tree.balls.len() > balls {
+            Child::leaf(true, balls, self.tree.balls.len() - balls)
+        } else {
+            Child::leaf(false, packets, self.tree.packets.len() - packets)
+        };
+        (child, bounds)
+    }
+}

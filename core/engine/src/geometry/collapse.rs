@@ -1,0 +1,177 @@
+//! The cheapest eight-wide hierarchy within a binary one, by dynamic programming.
+//!
+//! Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", §3.1, with leaf costs
+//! counted in packets. C(n, i) is the least surface-area cost of the subtree of n as a forest of at most i roots:
+//!
+//!   C(n, 1) = min(leaf(n), A(n)·c_node + split(n, 8))
+//!   C(n, i) = min(split(n, i), C(n, i − 1))
+//!   split(n, i) = min over 0 < k < i of C(left, k) + C(right, i − k)
+
+use obvhs::bvh2::Bvh2;
+
+use super::triangle::LANES;
+
+/// Cost of testing a node's eight boxes and sorting what is met, relative to [`PACKET_COST`].
+const NODE_COST: f32 = 1.0;
+/// Cost of testing a packet of triangles.
+const PACKET_COST: f32 = 1.0;
+/// Most primitives in one leaf: two packets of triangles, or as many spheres.
+const MAX_LEAF: u32 = 2 * LANES as u32;
+
+/// What becomes of a binary node: a leaf of the wide hierarchy, or a node of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Step {
+    Leaf(u32),
+    Inner(u32),
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    /// C(n, 1) … C(n, 7)
+    cost: [f32; 7],
+    /// Roots given to the left child in the best split into 2 … 8 roots; 0: one root fewer is better.
+    left: [u8; 7],
+    leaf: bool,
+    triangles: u32,
+    balls: u32,
+}
+
+/// Decisions for every binary node.
+pub(super) struct Plan {
+    entries: Vec<Entry>,
+}
+
+impl Plan {
+    pub fn new(binary: &Bvh2, is_ball: impl Fn(u32) -> bool) -> Self {
+        let mut entries = vec![Entry::default(); binary.nodes.len()];
+        for &n in preorder(binary).iter().rev() {
+            let node = &binary.nodes[n as usize];
+            let area = node.aabb().half_area();
+            entries[n as usize] = if node.is_leaf() {
+                // The builder makes leaves of one primitive.
+                let ball = is_ball(binary.primitive_indices[node.first_index as usize]);
+                Entry {
+                    cost: [area * PACKET_COST; 7],
+                    left: [0; 7],
+                    leaf: true,
+                    triangles: u32::from(!ball),
+                    balls: u32::from(ball),
+                }
+            } else {
+                let children = node.first_index as usize;
+                combine(area, &entries[children], &entries[children + 1])
+            };
+        }
+        Self { entries }
+    }
+
+    pub fn is_leaf(&self, n: u32) -> bool {
+        self.entries[n as usize].leaf
+    }
+
+    /// The up to eight children of inner node `n` of the wide hierarchy.
+    pub fn children(&self, binary: &Bvh2, n: u32) -> Vec<Step> {
+        let mut out = Vec::with_capacity(8);
+        let first = binary.nodes[n as usize].first_index;
+        let k = usize::from(self.entries[n as usize].left[6]);
+        let mut todo = vec![(first + 1, 8 - k), (first, k)];
+        while let Some((n, roots)) = todo.pop() {
+            let e = &self.entries[n as usize];
+            let mut roots = roots;
+            while roots > 1 && e.left[roots - 2] == 0 {
+                roots -= 1;
+            }
+            if roots > 1 {
+                let first = binary.nodes[n as usize].first_index;
+                let k = usize::from(e.left[roots - 2]);
+                todo.push((first + 1, roots - k));
+                todo.push((first, k));
+            } else {
+                out.push(if e.leaf {
+                    Step::Leaf(n)
+                } else {
+                    Step::Inner(n)
+                });
+            }
+        }
+        out
+    }
+
+    /// Primitives below binary node `n`.
+    pub fn subtree(&self, binary: &Bvh2, n: u32) -> Vec<u32> {
+        let e = &self.entries[n as usize];
+        let mut out = Vec::with_capacity((e.triangles + e.balls) as usize);
+        let mut todo = vec![n];
+        while let Some(n) = todo.pop() {
+            let node = &binary.nodes[n as usize];
+            if node.is_leaf() {
+                out.push(binary.primitive_indices[node.first_index as usize]);
+            } else {
+                todo.push(node.first_index + 1);
+                todo.push(node.first_index);
+            }
+        }
+        out
+    }
+}
+
+/// Every node after its parent.
+fn preorder(binary: &Bvh2) -> Vec<u32> {
+    let mut order = Vec::with_capacity(binary.nodes.len());
+    let mut todo = vec![0];
+    while let Some(n) = todo.pop() {
+        order.push(n);
+        let node = &binary.nodes[n as usize];
+        if !node.is_leaf() {
+            todo.push(node.first_index);
+            todo.push(node.first_index + 1);
+        }
+    }
+    order
+}
+
+fn combine(area: f32, left: &Entry, right: &Entry) -> Entry {
+    let mut e = Entry {
+        triangles: left.triangles + right.triangles,
+        balls: left.balls + right.balls,
+        ..Entry::default()
+    };
+    let split = |roots: usize| {
+        let mut best = (f32::INFINITY, 0);
+        for k in 1..roots.min(8) {
+            if k <= 7 && roots - k <= 7 {
+                let cost = left.cost[k - 1] + right.cost[roots - k - 1];
+                if cost < best.0 {
+                    best = (cost, k as u8);
+                }
+            }
+        }
+        best
+    };
+    let (below, k) = split(8);
+    e.left[6] = k;
+    e.cost[0] = area * NODE_COST + below;
+    let count = e.triangles + e.balls;
+    if count <= MAX_LEAF && (e.triangles == 0 || e.balls == 0) {
+        let tests = if e.balls > 0 {
+            e.balls
+        } else {
+            e.triangles.div_ceil(LANES as u32)
+        };
+        let cost = area * PACKET_COST * tests as f32;
+        if cost <= e.cost[0] {
+            e.cost[0] = cost;
+            e.leaf = true;
+        }
+    }
+    for roots in 2..8 {
+        let (cost, k) = split(roots);
+        if cost < e.cost[roots - 2] {
+            e.cost[roots - 1] = cost;
+            e.left[roots - 2] = k;
+        } else {
+            e.cost[roots - 1] = e.cost[roots - 2];
+        }
+    }
+    e
+}

@@ -1,0 +1,267 @@
+//! What can be traced, and the checks it passes before the builder sees it.
+
+use glam::{Vec2, Vec3};
+
+use super::bvh8::MAX_ITEMS;
+use super::ray::MAX_COORDINATE;
+
+/// A triangle mesh with shared vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertex positions, scene units.
+    pub positions: Vec<Vec3>,
+    /// Shading normals, one a vertex, of any length; empty if the mesh has none.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, one a vertex; empty if the mesh has none.
+    pub uvs: Vec<Vec2>,
+    /// Triangles. The front (towards which the geometric normal points) is where their vertices run counter-clockwise.
+    pub indices: Vec<[u32; 3]>,
+}
+
+/// A sphere; its geometric normal points outwards.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// Centre, scene units.
+    pub center: Vec3,
+    /// Radius, scene units, greater than 0.
+    pub radius: f32,
+}
+
+/// A parallelogram corner + s·edge_u + t·edge_v with s, t in \[0, 1\]; its geometric normal is along edge_u × edge_v.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quad {
+    /// The corner at s = t = 0, scene units.
+    pub corner: Vec3,
+    /// Edge along which s grows.
+    pub edge_u: Vec3,
+    /// Edge along which t grows.
+    pub edge_v: Vec3,
+}
+
+impl Quad {
+    /// The two triangles that are traced: they share the diagonal from (0, 0) to (1, 1).
+    pub(super) fn triangle(&self, half: u32) -> [Vec3; 3] {
+        let opposite = self.corner + self.edge_u + self.edge_v;
+        if half == 0 {
+            [self.corner, self.corner + self.edge_u, opposite]
+        } else {
+            [self.corner, opposite, self.corner + self.edge_v]
+        }
+    }
+}
+
+/// Something rays can hit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Indexed triangles.
+    Mesh(TriangleMesh),
+    /// An analytic sphere.
+    Sphere(Sphere),
+    /// A parallelogram.
+    Quad(Quad),
+}
+
+impl Shape {
+    /// Number of primitives: triangles of a mesh, two halves of a quad, one sphere.
+    pub fn primitives(&self) -> usize {
+        match self {
+            Self::Mesh(m) => m.indices.len(),
+            Self::Sphere(_) => 1,
+            Self::Quad(_) => 2,
+        }
+    }
+
+    /// Vertices of primitive `prim`; `None` for a sphere.
+    pub(super) fn triangle(&self, prim: u32) -> Option<[Vec3; 3]> {
+        match self {
+            Self::Mesh(m) => Some(m.indices[prim as usize].map(|i| m.positions[i as usize])),
+            Self::Sphere(_) => None,
+            Self::Quad(q) => Some(q.triangle(prim)),
+        }
+    }
+}
+
+/// All shapes of a scene. A shape's index here is what hits and errors name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Geometry {
+    /// The shapes.
+    pub shapes: Vec<Shape>,
+}
+
+/// Why shapes cannot be traced.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GeometryError {
+    /// A mesh vertex is NaN, infinite or beyond [`MAX_COORDINATE`].
+    #[error(
+        "shape {shape}: vertex {vertex} is {value}; coordinates must be finite and within ±1e18"
+    )]
+    Vertex {
+        /// Index of the shape.
+        shape: usize,
+        /// Index of the vertex.
+        vertex: usize,
+        /// The position found.
+        value: Vec3,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error(
+        "shape {shape}: triangle {triangle} refers to vertex {index}, but there are {vertices} vertices"
+    )]
+    Index {
+        /// Index of the shape.
+        shape: usize,
+        /// Index of the triangle.
+        triangle: usize,
+        /// The index found.
+        index: u32,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A per-vertex attribute has another length than the positions.
+    #[error("shape {shape}: {found} {attribute} for {vertices} vertices")]
+    AttributeCount {
+        /// Index of the shape.
+        shape: usize,
+        /// "normals" or "uvs".
+        attribute: &'static str,
+        /// Number found.
+        found: usize,
+        /// Number of vertices.
+        vertices: usize,
+    },
+    /// A per-vertex attribute is NaN or infinite.
+    #[error("shape {shape}: the {attribute} of vertex {vertex} are not finite")]
+    Attribute {
+        /// Index of the shape.
+        shape: usize,
+        /// "normals" or "uvs".
+        attribute: &'static str,
+        /// Index of the vertex.
+        vertex: usize,
+    },
+    /// A sphere has a bad centre, or a radius that is not positive and finite, or both together exceed the coordinate range.
+    #[error(
+        "shape {shape}: sphere with centre {center} and radius {radius}; both must be finite and within ±1e18, the radius positive"
+    )]
+    Sphere {
+        /// Index of the shape.
+        shape: usize,
+        /// Centre found.
+        center: Vec3,
+        /// Radius found.
+        radius: f32,
+    },
+    /// A quad has a corner that is not finite or beyond [`MAX_COORDINATE`].
+    #[error(
+        "shape {shape}: corner {corner} of the quad is {value}; coordinates must be finite and within ±1e18"
+    )]
+    Quad {
+        /// Index of the shape.
+        shape: usize,
+        /// Corner 0 to 3, counter-clockwise.
+        corner: usize,
+        /// The position found.
+        value: Vec3,
+    },
+    /// More primitives than the hierarchy can address.
+    #[error("{0} primitives; at most {MAX_ITEMS} can be traced")]
+    TooMany(usize),
+}
+
+fn in_range(p: Vec3) -> bool {
+    // False for NaN.
+    p.abs().max_element() <= MAX_COORDINATE && p.is_finite()
+}
+
+impl Geometry {
+    /// Number of primitives of all shapes.
+    pub fn primitives(&self) -> usize {
+        self.shapes.iter().map(Shape::primitives).sum()
+    }
+
+    /// Checks everything a traversal or an interaction relies on. Degenerate triangles are not errors.
+    pub fn check(&self) -> Result<(), GeometryError> {
+        for (i, shape) in self.shapes.iter().enumerate() {
+            match shape {
+                Shape::Mesh(m) => check_mesh(i, m)?,
+                Shape::Sphere(s) => {
+                    let reach = Vec3::splat(s.radius);
+                    let fits = in_range(s.center)
+                        && in_range(s.center - reach)
+                        && in_range(s.center + reach);
+                    if !(fits && s.radius > 0.0) {
+                        return Err(GeometryError::Sphere {
+                            shape: i,
+                            center: s.center,
+                            radius: s.radius,
+                        });
+                    }
+                }
+                Shape::Quad(q) => {
+                    let ([a, b, c], [_, _, d]) = (q.triangle(0), q.triangle(1));
+                    for (corner, value) in [a, b, c, d].into_iter().enumerate() {
+                        if !in_range(value) {
+                            return Err(GeometryError::Quad {
+                                shape: i,
+                                corner,
+                                value,
+                            });
+                        }
+                    }
+                }
+            }
+        }
+        let count = self.primitives();
+        if count > MAX_ITEMS {
+            Err(GeometryError::TooMany(count))
+        } else {
+            Ok(())
+        }
+    }
+}
+
+fn check_mesh(shape: usize, m: &TriangleMesh) -> Result<(), GeometryError> {
+    let vertices = m.positions.len();
+    if let Some(vertex) = m.positions.iter().position(|&p| !in_range(p)) {
+        return Err(GeometryError::Vertex {
+            shape,
+            vertex,
+            value: m.positions[vertex],
+        });
+    }
+    for (attribute, found) in [("normals", m.normals.len()), ("uvs", m.uvs.len())] {
+        if found != 0 && found != vertices {
+            return Err(GeometryError::AttributeCount {
+                shape,
+                attribute,
+                found,
+                vertices,
+            });
+        }
+    }
+    if let Some(vertex) = m.normals.iter().position(|n| !n.is_finite()) {
+        return Err(GeometryError::Attribute {
+            shape,
+            attribute: "normals",
+            vertex,
+        });
+    }
+    if let Some(vertex) = m.uvs.iter().position(|n| !n.is_finite()) {
+        return Err(GeometryError::Attribute {
+            shape,
+            attribute: "uvs",
+            vertex,
+        });
+    }
+    for (triangle, t) in m.indices.iter().enumerate() {
+        if let Some(&index) = t.iter().find(|&&i| i as usize >= vertices) {
+            return Err(GeometryError::Index {
+                shape,
+                triangle,
+                index,
+                vertices,
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,179 @@
+//! Slab and triangle kernels for AVX2: the only `unsafe` code of this module.
+//!
+//! Same operations in the same order as [`super::portable`] (no fused multiply-add, full-precision division), hence the same
+//! hits to the bit; the tests hold both against each other.
+
+use std::arch::x86_64::*;
+
+use super::bvh8::Node8;
+use super::portable::{Kernel, Near, decide};
+use super::ray::RaySetup;
+use super::traverse::{self, Candidate, Tree};
+use super::triangle::{Packet, PacketHits, TINY_DET, gamma};
+
+/// Proof that the processor has AVX2: only [`Avx2::detect`] makes one.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Avx2(());
+
+impl Avx2 {
+    /// The proof, if this processor and operating system support AVX2.
+    pub fn detect() -> Option<Self> {
+        std::arch::is_x86_feature_detected!("avx2").then_some(Self(()))
+    }
+
+    /// [`traverse::closest`], compiled for AVX2.
+    #[inline(always)]
+    pub fn closest<F: FnMut(&Candidate) -> bool>(
+        self,
+        tree: &Tree,
+        ray: &RaySetup,
+        accept: F,
+    ) -> Option<Candidate> {
+        // SAFETY: `self` proves that AVX2 is available.
+        unsafe { closest_avx2(self, tree, ray, accept) }
+    }
+
+    /// [`traverse::occluded`], compiled for AVX2.
+    #[inline(always)]
+    pub fn occluded<F: FnMut(&Candidate) -> bool>(
+        self,
+        tree: &Tree,
+        ray: &RaySetup,
+        opaque: F,
+    ) -> bool {
+        // SAFETY: `self` proves that AVX2 is available.
+        unsafe { occluded_avx2(self, tree, ray, opaque) }
+    }
+}
+
+#[target_feature(enable = "avx2")]
+fn closest_avx2<F: FnMut(&Candidate) -> bool>(
+    k: Avx2,
+    tree: &Tree,
+    ray: &RaySetup,
+    accept: F,
+) -> Option<Candidate> {
+    traverse::closest(k, tree, ray, accept)
+}
+
+#[target_feature(enable = "avx2")]
+fn occluded_avx2<F: FnMut(&Candidate) -> bool>(
+    k: Avx2,
+    tree: &Tree,
+    ray: &RaySetup,
+    opaque: F,
+) -> bool {
+    traverse::occluded(k, tree, ray, opaque)
+}
+
+impl Kernel for Avx2 {
+    #[inline(always)]
+    fn node(self, ray: &RaySetup, node: &Node8, t_max: f32) -> (u32, Near) {
+        // SAFETY: `self` proves that AVX2 is available. Each load reads one row of eight f32; rows are 32 bytes apart in a
+        // struct aligned to 32. The store writes the eight f32 of `near`, aligned to 32.
+        unsafe {
+            let mut near = _mm256_set1_ps(ray.t_min);
+            let mut far = _mm256_set1_ps(t_max);
+            // Unrolled by the compiler. On NaN (0·inf) max and min return their second operand: the axis is skipped.
+            for axis in 0..3 {
+                let row = ray.near_row[axis];
+                let o = _mm256_set1_ps(ray.o[axis]);
+                let n = _mm256_sub_ps(_mm256_load_ps(node.bounds[row].as_ptr()), o);
+                let f = _mm256_sub_ps(_mm256_load_ps(node.bounds[row ^ 1].as_ptr()), o);
+                near = _mm256_max_ps(_mm256_mul_ps(n, _mm256_set1_ps(ray.inv_near[axis])), near);
+                far = _mm256_min_ps(_mm256_mul_ps(f, _mm256_set1_ps(ray.inv_far[axis])), far);
+            }
+            let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32;
+            let mut out = Near([0.0; 8]);
+            _mm256_store_ps(out.0.as_mut_ptr(), near);
+            (mask, out)
+        }
+    }
+
+    #[inline(always)]
+    fn packet(self, ray: &RaySetup, packet: &Packet, t_max: f32, hits: &mut PacketHits) -> u32 {
+        // SAFETY: `self` proves that AVX2 (hence SSE) is available. Each load reads one row of four f32; rows are 16 bytes
+        // apart in a struct aligned to 32. The stores write the rows of `hits`, aligned to 16.
+        unsafe {
+            let [kx, ky, kz] = ray.k;
+            let (ox, oy, oz) = (
+                _mm_set1_ps(ray.o[kx]),
+                _mm_set1_ps(ray.o[ky]),
+                _mm_set1_ps(ray.o[kz]),
+            );
+            let (sx, sy) = (_mm_set1_ps(ray.s[0]), _mm_set1_ps(ray.s[1]));
+            let shear = |v: &[[f32; 4]; 3]| {
+                let z = _mm_sub_ps(_mm_load_ps(v[kz].as_ptr()), oz);
+                let x = _mm_sub_ps(_mm_load_ps(v[kx].as_ptr()), ox);
+                let y = _mm_sub_ps(_mm_load_ps(v[ky].as_ptr()), oy);
+                (
+                    _mm_sub_ps(x, _mm_mul_ps(sx, z)),
+                    _mm_sub_ps(y, _mm_mul_ps(sy, z)),
+                    z,
+                )
+            };
+            let (ax, ay, az) = shear(&packet.v[0]);
+            let (bx, by, bz) = shear(&packet.v[1]);
+            let (cx, cy, cz) = shear(&packet.v[2]);
+            let u = _mm_sub_ps(_mm_mul_ps(cx, by), _mm_mul_ps(cy, bx));
+            let v = _mm_sub_ps(_mm_mul_ps(ax, cy), _mm_mul_ps(ay, cx));
+            let w = _mm_sub_ps(_mm_mul_ps(bx, ay), _mm_mul_ps(by, ax));
+
+            let differ = _mm_or_ps(_mm_xor_ps(u, v), _mm_xor_ps(v, w));
+            let same = !(_mm_movemask_ps(differ) as u32) & 15;
+            let nought = _mm_setzero_ps();
+            let zeros = _mm_or_ps(
+                _mm_or_ps(_mm_cmpeq_ps(u, nought), _mm_cmpeq_ps(v, nought)),
+                _mm_cmpeq_ps(w, nought),
+            );
+            let zero = _mm_movemask_ps(zeros) as u32;
+            if same | zero == 0 {
+                return 0;
+            }
+
+            let abs = |x| _mm_andnot_ps(_mm_set1_ps(-0.0), x);
+            let max3 = |a, b, c| _mm_max_ps(_mm_max_ps(abs(a), abs(b)), abs(c));
+            let splat = |x: f32| _mm_set1_ps(x);
+            let det = _mm_add_ps(_mm_add_ps(u, v), w);
+            let rcp = _mm_div_ps(splat(1.0), det);
+            let (bu, bv, bw) = (_mm_mul_ps(u, rcp), _mm_mul_ps(v, rcp), _mm_mul_ps(w, rcp));
+            let depth = _mm_add_ps(
+                _mm_add_ps(_mm_mul_ps(bu, az), _mm_mul_ps(bv, bz)),
+                _mm_mul_ps(bw, cz),
+            );
+            let t = _mm_mul_ps(depth, splat(ray.s[2]));
+            let (lo, hi) = (splat(ray.t_min), splat(t_max));
+            let inside = _mm_and_ps(_mm_cmpgt_ps(t, lo), _mm_cmple_ps(t, hi));
+
+            let (x, y, z) = (max3(ax, bx, cx), max3(ay, by, cy), max3(az, bz, cz));
+            let max_e = max3(u, v, w);
+            let g6 = splat(gamma(6));
+            let dx = _mm_mul_ps(g6, _mm_add_ps(x, z));
+            let dy = _mm_mul_ps(g6, _mm_add_ps(y, z));
+            let xy = _mm_mul_ps(_mm_mul_ps(splat(gamma(3)), x), y);
+            let de = _mm_mul_ps(
+                splat(2.0),
+                _mm_add_ps(_mm_add_ps(xy, _mm_mul_ps(dy, x)), _mm_mul_ps(dx, y)),
+            );
+            let spread = _mm_mul_ps(_mm_add_ps(_mm_mul_ps(g6, max_e), de), z);
+            let dt = _mm_mul_ps(
+                _mm_mul_ps(_mm_mul_ps(splat(3.0), spread), abs(rcp)),
+                splat(ray.s[2].abs()),
+            );
+            let near_end = _mm_or_ps(
+                _mm_cmple_ps(abs(_mm_sub_ps(t, lo)), dt),
+                _mm_cmple_ps(abs(_mm_sub_ps(t, splat(ray.t_max))), dt),
+            );
+            let tiny = _mm_cmplt_ps(abs(det), splat(TINY_DET));
+            let undecided = zero | (same & _mm_movemask_ps(_mm_or_ps(tiny, near_end)) as u32);
+            _mm_store_ps(hits.t.as_mut_ptr(), t);
+            _mm_store_ps(hits.u.as_mut_ptr(), bv);
+            _mm_store_ps(hits.v.as_mut_ptr(), bw);
+            let found = same & _mm_movemask_ps(inside) as u32;
+            if found | undecided == 0 {
+                return 0;
+            }
+            decide(ray, packet, t_max, hits, found, undecided)
+        }
+    }
+}

@@ -1,0 +1,197 @@
+//! The surface at a hit: position with its error, normals, texture coordinates; and how rays leave it.
+
+use std::f32::consts::{PI, TAU};
+
+use glam::{DVec3, Vec2, Vec3};
+
+use super::input::{Geometry, Quad, Shape, Sphere, TriangleMesh};
+use super::ray::{Hit, Ray, RaySetup};
+use super::triangle;
+
+/// A point on a surface and its local frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Position, scene units: interpolated from the vertices, not o + t·d.
+    pub p: Vec3,
+    /// Bound on the distance of `p` from the surface along each axis.
+    pub p_error: Vec3,
+    /// Geometric normal, unit: (v1 − v0) × (v2 − v0) for triangles, edge_u × edge_v for quads, outwards for spheres. It does
+    /// not depend on where the ray came from.
+    pub ng: Vec3,
+    /// Shading normal, unit, on the same side as `ng` (ng·ns ≥ 0): interpolated if the mesh has normals, else `ng`.
+    pub ns: Vec3,
+    /// Texture coordinates: the mesh's; for meshes without any, the barycentric weights of the second and third vertex; (s, t)
+    /// of quads; (φ/2π, θ/π) of spheres with θ from +z.
+    pub uv: Vec2,
+    /// ∂p/∂u. Where the coordinates do not define it: some vector in the tangent plane of `ng`.
+    pub dpdu: Vec3,
+    /// Index of the shape.
+    pub shape: u32,
+    /// Primitive within the shape.
+    pub prim: u32,
+}
+
+impl Geometry {
+    /// The surface at a `hit` of `ray`.
+    ///
+    /// # Panics
+    /// If the hit names a shape or primitive that does not exist.
+    pub fn interaction(&self, hit: &Hit, ray: &Ray) -> SurfacePoint {
+        match &self.shapes[hit.shape as usize] {
+            Shape::Mesh(m) => mesh(m, hit, ray),
+            Shape::Quad(q) => quad(q, hit, ray),
+            Shape::Sphere(s) => sphere(s, hit, ray),
+        }
+    }
+}
+
+/// Position and normal of barycentrics (u, v), in f64: the only rounding that matters is the last one to f32.
+fn flat(vertices: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, DVec3, DVec3, Vec3) {
+    let [a, b, c] = vertices.map(|v| v.as_dvec3());
+    let (e1, e2) = (b - a, c - a);
+    let p = a + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
+    let n = e1.cross(e2);
+    let n = match n.try_normalize() {
+        Some(n) => n.as_vec3(),
+        // Three vertices on a line, met at the gap that they cover between their neighbours: any normal, on the right side.
+        None => {
+            let back = ray.d.normalize_or(Vec3::Z);
+            let front = RaySetup::new(ray)
+                .is_none_or(|r| triangle::meets_front(&r, vertices.map(|v| v.to_array())));
+            if front { -back } else { back }
+        }
+    };
+    (p, e1, e2, n)
+}
+
+/// Rounds a position to f32 and bounds what that did: half a unit in the last place, and a trace for the f64 part before.
+fn rounded(p: DVec3) -> (Vec3, Vec3) {
+    let error = p.abs() * (1.001 / 16_777_216.0);
+    (
+        p.as_vec3(),
+        error.as_vec3().max(Vec3::splat(f32::MIN_POSITIVE)),
+    )
+}
+
+fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray) -> SurfacePoint {
+    let corner = m.indices[hit.prim as usize].map(|i| i as usize);
+    let (p, e1, e2, ng) = flat(corner.map(|i| m.positions[i]), hit, ray);
+    let (p, p_error) = rounded(p);
+    let (u, v) = (hit.u, hit.v);
+    let ns = if m.normals.is_empty() {
+        ng
+    } else {
+        let [n0, n1, n2] = corner.map(|i| m.normals[i].normalize_or_zero());
+        let n = (n0 * (1.0 - u - v) + n1 * u + n2 * v).normalize_or(ng);
+        if n.dot(ng) < 0.0 { -n } else { n }
+    };
+    let (uv, dpdu) = if m.uvs.is_empty() {
+        (Vec2::new(u, v), e1.as_vec3())
+    } else {
+        let [t0, t1, t2] = corner.map(|i| m.uvs[i]);
+        let (d1, d2) = ((t1 - t0).as_dvec2(), (t2 - t0).as_dvec2());
+        let det = d1.x * d2.y - d1.y * d2.x;
+        let dpdu = ((e1 * d2.y - e2 * d1.y) / det).as_vec3();
+        let usable = dpdu.is_finite() && dpdu != Vec3::ZERO;
+        (
+            t0 * (1.0 - u - v) + t1 * u + t2 * v,
+            if usable {
+                dpdu
+            } else {
+                ng.any_orthonormal_vector()
+            },
+        )
+    };
+    SurfacePoint {
+        p,
+        p_error,
+        ng,
+        ns,
+        uv,
+        dpdu,
+        shape: hit.shape,
+        prim: hit.prim,
+    }
+}
+
+fn quad(q: &Quad, hit: &Hit, ray: &Ray) -> SurfacePoint {
+    let (p, _, _, ng) = flat(q.triangle(hit.prim), hit, ray);
+    let (p, p_error) = rounded(p);
+    let (u, v) = (hit.u, hit.v);
+    // Half 0 is corner + u·edge_u + v·(edge_u + edge_v), half 1 is corner + u·(edge_u + edge_v) + v·edge_v.
+    let uv = if hit.prim == 0 {
+        Vec2::new(u + v, v)
+    } else {
+        Vec2::new(u, u + v)
+    };
+    SurfacePoint {
+        p,
+        p_error,
+        ng,
+        ns: ng,
+        uv,
+        dpdu: q.edge_u,
+        shape: hit.shape,
+        prim: hit.prim,
+    }
+}
+
+fn sphere(s: &Sphere, hit: &Hit, ray: &Ray) -> SurfacePoint {
+    let center = s.center.as_dvec3();
+    let r = f64::from(s.radius);
+    let local = ray.o.as_dvec3() + ray.d.as_dvec3() * f64::from(hit.t) - center;
+    // t is an f32: what it is off along the ray is taken back by projecting onto the sphere.
+    let n = local.try_normalize().unwrap_or(DVec3::Z);
+    let (p, p_error) = rounded(center + n * r);
+    let ng = n.as_vec3();
+    let phi = ng.y.atan2(ng.x);
+    let phi = if phi < 0.0 { phi + TAU } else { phi };
+    let uv = Vec2::new(phi / TAU, ng.z.clamp(-1.0, 1.0).acos() / PI);
+    let along = Vec3::new(-ng.y, ng.x, 0.0) * (TAU * s.radius);
+    let dpdu = if along == Vec3::ZERO {
+        Vec3::Y * s.radius
+    } else {
+        along
+    };
+    SurfacePoint {
+        p,
+        p_error,
+        ng,
+        ns: ng,
+        uv,
+        dpdu,
+        shape: hit.shape,
+        prim: hit.prim,
+    }
+}
+
+/// Moves the origin of a ray that leaves the surface at `p` to direction `w` off the surface, to the side of `w`: along ±`ng`
+/// far enough that the new origin lies beyond the true surface whatever the rounding of `p` was, then one float further along
+/// each axis against the rounding of the move itself (pbrt §6.8.6).
+pub fn offset_origin(p: Vec3, p_error: Vec3, ng: Vec3, w: Vec3) -> Vec3 {
+    let distance = ng.abs().dot(p_error);
+    let offset = ng * if w.dot(ng) < 0.0 { -distance } else { distance };
+    let moved = (p + offset).to_array();
+    let offset = offset.to_array();
+    Vec3::from_array([0, 1, 2].map(|i| {
+        if offset[i] > 0.0 {
+            moved[i].next_up()
+        } else if offset[i] < 0.0 {
+            moved[i].next_down()
+        } else {
+            moved[i]
+        }
+    }))
+}
+
+impl SurfacePoint {
+    /// [`offset_origin`] of this point.
+    pub fn offset(&self, w: Vec3) -> Vec3 {
+        offset_origin(self.p, self.p_error, self.ng, w)
+    }
+
+    /// The ray that leaves this point in direction `w`.
+    pub fn spawn(&self, w: Vec3) -> Ray {
+        Ray::new(self.offset(w), w)
+    }
+}

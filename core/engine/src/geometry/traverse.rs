@@ -1,0 +1,251 @@
+//! Ordered traversal of the eight-wide hierarchy, generic over the kernel that tests boxes and triangles.
+
+use super::bvh8::{Child, Node8};
+use super::portable::Kernel;
+use super::ray::RaySetup;
+use super::sphere::Ball;
+use super::triangle::{Packet, PacketHits};
+
+/// Deepest hierarchy the builder makes, counted in nodes on a path from the root.
+pub(super) const MAX_DEPTH: usize = 36;
+
+/// Each level leaves at most seven siblings behind.
+const DEEP_STACK: usize = 7 * MAX_DEPTH + 1;
+
+/// Enough for depth 9. Clearing the stack is a measurable part of a ray, hence two sizes.
+const SHALLOW_STACK: usize = 64;
+
+/// What is traversed: nodes from the root (index 0), triangle packets, spheres.
+#[derive(Clone, Debug)]
+pub(super) struct Tree {
+    pub nodes: Vec<Node8>,
+    pub packets: Vec<Packet>,
+    pub balls: Vec<Ball>,
+    /// Nodes on the longest path from the root.
+    pub depth: usize,
+}
+
+/// A hit on primitive `prim`, numbered through all shapes of the geometry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Candidate {
+    pub t: f32,
+    pub prim: u32,
+    pub u: f32,
+    pub v: f32,
+}
+
+/// Nearest accepted hit; of hits at equal t the one with the lowest primitive number, whatever the order of traversal.
+#[inline(always)]
+pub(super) fn closest<K: Kernel, F>(
+    k: K,
+    tree: &Tree,
+    ray: &RaySetup,
+    accept: F,
+) -> Option<Candidate>
+where
+    F: FnMut(&Candidate) -> bool,
+{
+    if 7 * tree.depth < SHALLOW_STACK {
+        closest_sized::<K, F, SHALLOW_STACK>(k, tree, ray, accept)
+    } else {
+        closest_sized::<K, F, DEEP_STACK>(k, tree, ray, accept)
+    }
+}
+
+/// Whether any hit is `opaque`.
+#[inline(always)]
+pub(super) fn occluded<K: Kernel, F>(k: K, tree: &Tree, ray: &RaySetup, opaque: F) -> bool
+where
+    F: FnMut(&Candidate) -> bool,
+{
+    if 7 * tree.depth < SHALLOW_STACK {
+        occluded_sized::<K, F, SHALLOW_STACK>(k, tree, ray, opaque)
+    } else {
+        occluded_sized::<K, F, DEEP_STACK>(k, tree, ray, opaque)
+    }
+}
+
+/// Stack entry: entry distance in the upper half, child in the lower, so that entries compare by distance. Distances are not
+/// negative, and the bits of such floats are ordered like their values.
+#[inline(always)]
+fn entry(near: f32, child: Child) -> u64 {
+    u64::from(near.to_bits()) << 32 | u64::from(child.0)
+}
+
+#[inline(always)]
+fn closest_sized<K: Kernel, F, const N: usize>(
+    k: K,
+    tree: &Tree,
+    ray: &RaySetup,
+    mut accept: F,
+) -> Option<Candidate>
+where
+    F: FnMut(&Candidate) -> bool,
+{
+    // prim 0 makes "equal t, lower number" false for a hit exactly at t_max, which is excluded.
+    let mut best = Candidate {
+        t: ray.t_max,
+        prim: 0,
+        u: 0.0,
+        v: 0.0,
+    };
+    let mut found = false;
+    let mut consider = |c: Candidate, best: &mut Candidate| {
+        if (c.t < best.t || (c.t == best.t && c.prim < best.prim)) && accept(&c) {
+            *best = c;
+            found = true;
+        }
+    };
+    let mut stack = [0u64; N];
+    let mut height = 0;
+    let mut current = Child::node(0);
+    'walk: loop {
+        while !current.is_leaf() {
+            let node = &tree.nodes[current.0 as usize];
+            let (mut mask, near) = k.node(ray, node, best.t);
+            if mask == 0 {
+                match pop(&stack, &mut height, best.t) {
+                    Some(next) => current = next,
+                    None => break 'walk,
+                }
+                continue;
+            }
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            if mask == 0 {
+                current = node.child[lane & 7];
+                continue;
+            }
+            // Push in order of decreasing distance by insertion, then take the nearest off the top.
+            let base = height;
+            stack[height] = entry(near.0[lane & 7], node.child[lane & 7]);
+            height += 1;
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                let new = entry(near.0[lane], node.child[lane]);
+                let mut at = height;
+                while at > base && stack[at - 1] < new {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = new;
+                height += 1;
+            }
+            height -= 1;
+            current = Child(stack[height] as u32);
+        }
+        if current.is_spheres() {
+            for ball in &tree.balls[current.items()] {
+                if let Some(t) = ball.intersect(ray, best.t) {
+                    consider(
+                        Candidate {
+                            t,
+                            prim: ball.prim,
+                            u: 0.0,
+                            v: 0.0,
+                        },
+                        &mut best,
+                    );
+                }
+            }
+        } else {
+            let mut hits = PacketHits::NONE;
+            for packet in &tree.packets[current.items()] {
+                let mut mask = k.packet(ray, packet, best.t, &mut hits);
+                while mask != 0 {
+                    let i = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    consider(
+                        Candidate {
+                            t: hits.t[i],
+                            prim: packet.prim[i],
+                            u: hits.u[i],
+                            v: hits.v[i],
+                        },
+                        &mut best,
+                    );
+                }
+            }
+        }
+        match pop(&stack, &mut height, best.t) {
+            Some(next) => current = next,
+            None => break,
+        }
+    }
+    found.then_some(best)
+}
+
+/// Next subtree that may hold a hit at or before `t_max`.
+#[inline(always)]
+fn pop<const N: usize>(stack: &[u64; N], height: &mut usize, t_max: f32) -> Option<Child> {
+    while *height > 0 {
+        *height -= 1;
+        let top = stack[*height];
+        if f32::from_bits((top >> 32) as u32) <= t_max {
+            return Some(Child(top as u32));
+        }
+    }
+    None
+}
+
+#[inline(always)]
+fn occluded_sized<K: Kernel, F, const N: usize>(
+    k: K,
+    tree: &Tree,
+    ray: &RaySetup,
+    mut opaque: F,
+) -> bool
+where
+    F: FnMut(&Candidate) -> bool,
+{
+    let t_max = ray.t_max;
+    let mut blocks = |c: Candidate| c.t < t_max && opaque(&c);
+    let mut stack = [0u32; N];
+    let mut height = 1; // The root, node 0, is on the stack.
+    while height > 0 {
+        height -= 1;
+        let current = Child(stack[height]);
+        if !current.is_leaf() {
+            let node = &tree.nodes[current.0 as usize];
+            let (mut mask, _) = k.node(ray, node, t_max);
+            while mask != 0 {
+                let lane = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                stack[height] = node.child[lane].0;
+                height += 1;
+            }
+        } else if current.is_spheres() {
+            for ball in &tree.balls[current.items()] {
+                if let Some(t) = ball.intersect(ray, t_max)
+                    && blocks(Candidate {
+                        t,
+                        prim: ball.prim,
+                        u: 0.0,
+                        v: 0.0,
+                    })
+                {
+                    return true;
+                }
+            }
+        } else {
+            let mut hits = PacketHits::NONE;
+            for packet in &tree.packets[current.items()] {
+                let mut mask = k.packet(ray, packet, t_max, &mut hits);
+                while mask != 0 {
+                    let i = mask.trailing_zeros() as usize & 3;
+                    mask &= mask - 1;
+                    if blocks(Candidate {
+                        t: hits.t[i],
+                        prim: packet.prim[i],
+                        u: hits.u[i],
+                        v: hits.v[i],
+                    }) {
+                        return true;
+                    }
+                }
+            }
+        }
+    }
+    false
+}

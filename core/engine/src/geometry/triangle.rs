@@ -1,0 +1,150 @@
+//! Triangles four at a time, and the double precision part of the watertight test.
+//!
+//! Woop, Benthin, Wald 2013, "Watertight Ray/Triangle Intersection" (JCGT 2(1)): vertices are moved into a frame where the ray
+//! is the z axis, then three edge functions decide. A vertex moves the same way whatever triangle it belongs to, and rounding
+//! is monotonic, so that the sign of an f32 edge function is right or the function is 0; zeros are decided in f64, where the
+//! products are exact. No fused multiply-add anywhere: it would break the antisymmetry of shared edges.
+
+use super::bvh8::Bounds;
+use super::ray::RaySetup;
+
+/// Triangles in one packet.
+pub(super) const LANES: usize = 4;
+
+/// Padding of a triangle's box in units of its largest extent, 8 unit roundoffs: the test moves vertices by up to 7u times the
+/// triangle's extent in addition to what [`super::ray`] covers.
+pub(super) const PAD: f32 = 8.0 / 16_777_216.0;
+
+/// |det| below this is recomputed in f64: products of f32 coordinates may have lost digits to underflow.
+pub(super) const TINY_DET: f32 = 1e-30;
+
+/// γ_n = n·u / (1 − n·u), u = 2⁻²⁴: bound on the relative error of n roundings (Higham; pbrt §6.8.1).
+pub(super) const fn gamma(n: u32) -> f32 {
+    let nu = n as f32 / 16_777_216.0;
+    nu / (1.0 - nu)
+}
+
+/// Whether `ray` meets the front of a triangle without area, by the orientation its sheared vertices have, which is what the hit
+/// was decided on and what agrees with the neighbours.
+pub(super) fn meets_front(ray: &RaySetup, vertices: [[f32; 3]; 3]) -> bool {
+    let [a, b, c] = vertices.map(|p| shear(ray, p));
+    let det =
+        (c[0] * b[1] - c[1] * b[0]) + (a[0] * c[1] - a[1] * c[0]) + (b[0] * a[1] - b[1] * a[0]);
+    // det is minus the z component of the sheared normal, and the ray runs along ±z.
+    det * f64::from(ray.s[2]) >= 0.0
+}
+
+/// A vertex in the frame where the ray is the z axis: the same f32 operations as in the kernels.
+fn shear(ray: &RaySetup, p: [f32; 3]) -> [f64; 3] {
+    let [kx, ky, kz] = ray.k;
+    let z = p[kz] - ray.o[kz];
+    let x = (p[kx] - ray.o[kx]) - ray.s[0] * z;
+    let y = (p[ky] - ray.o[ky]) - ray.s[1] * z;
+    [f64::from(x), f64::from(y), f64::from(z)]
+}
+
+/// Four triangles, 160 bytes. Unused lanes hold NaN, which fails every comparison.
+#[derive(Clone, Debug)]
+#[repr(C, align(32))]
+pub(super) struct Packet {
+    /// \[vertex\]\[axis\]\[lane\]
+    pub v: [[[f32; LANES]; 3]; 3],
+    /// Number of the triangle among all primitives of the geometry.
+    pub prim: [u32; LANES],
+}
+
+impl Packet {
+    pub const EMPTY: Self = Self {
+        v: [[[f32::NAN; LANES]; 3]; 3],
+        prim: [u32::MAX; LANES],
+    };
+
+    pub fn set(&mut self, lane: usize, triangle: [[f32; 3]; 3], prim: u32) {
+        for (rows, vertex) in self.v.iter_mut().zip(triangle) {
+            for (row, x) in rows.iter_mut().zip(vertex) {
+                row[lane] = x;
+            }
+        }
+        self.prim[lane] = prim;
+    }
+}
+
+/// What a packet test found: valid in the lanes of the returned mask only.
+#[derive(Clone, Copy)]
+#[repr(C, align(16))]
+pub(super) struct PacketHits {
+    pub t: [f32; LANES],
+    pub u: [f32; LANES],
+    pub v: [f32; LANES],
+}
+
+impl PacketHits {
+    pub const NONE: Self = Self {
+        t: [0.0; LANES],
+        u: [0.0; LANES],
+        v: [0.0; LANES],
+    };
+}
+
+/// Box that the watertight test cannot miss.
+pub(super) fn bounds(triangle: &[[f32; 3]; 3]) -> Bounds {
+    let mut b = Bounds::EMPTY;
+    for &p in triangle {
+        b.include_point(p);
+    }
+    let extent = (0..3).map(|i| b.max[i] - b.min[i]).fold(0.0, f32::max);
+    b.padded(extent * PAD)
+}
+
+/// Decides one lane in double precision, for lanes with an edge function of 0, a tiny determinant, or a t that is too close
+/// to an end of the interval for f32.
+///
+/// Membership is decided on the f32 sheared vertices (that is what makes shared edges consistent), by exact signs. The distance
+/// comes from the plane equation in f64, so that a ray which starts within f32 rounding of a triangle is put on the right side.
+/// Returns (t, u, v).
+#[cold]
+#[inline(never)]
+pub(super) fn decide_lane(
+    ray: &RaySetup,
+    packet: &Packet,
+    lane: usize,
+    t_max: f32,
+) -> Option<(f32, f32, f32)> {
+    let vertex = |i: usize| packet.v[i].map(|row| row[lane]);
+    let v = [vertex(0), vertex(1), vertex(2)];
+    let [a, b, c] = v.map(|p| shear(ray, p));
+    let u = c[0] * b[1] - c[1] * b[0];
+    let v_ = a[0] * c[1] - a[1] * c[0];
+    let w = b[0] * a[1] - b[1] * a[0];
+    if (u < 0.0 || v_ < 0.0 || w < 0.0) && (u > 0.0 || v_ > 0.0 || w > 0.0) {
+        return None;
+    }
+    let det = u + v_ + w;
+    if det == 0.0 || det.is_nan() {
+        return None;
+    }
+    let s = f64::from(ray.s[2]);
+    let z = [a[2] * s, b[2] * s, c[2] * s];
+    // The hit lies between the vertices; this also tames a plane seen exactly edge on.
+    let t = plane_distance(ray, &v).unwrap_or((u * z[0] + v_ * z[1] + w * z[2]) / det);
+    let t = t.clamp(z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+    if t > f64::from(ray.t_min) && t < f64::from(ray.t_max) && t as f32 <= t_max {
+        Some((t as f32, (v_ / det) as f32, (w / det) as f32))
+    } else {
+        None
+    }
+}
+
+/// Ray parameter of the triangle's plane, in f64; `None` if the triangle has no area or the ray lies in its plane.
+fn plane_distance(ray: &RaySetup, v: &[[f32; 3]; 3]) -> Option<f64> {
+    let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| f64::from(a[i]) - f64::from(b[i]));
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let (e1, e2) = (sub(v[1], v[0]), sub(v[2], v[0]));
+    let n = [
+        e1[1] * e2[2] - e1[2] * e2[1],
+        e1[2] * e2[0] - e1[0] * e2[2],
+        e1[0] * e2[1] - e1[1] * e2[0],
+    ];
+    let t = dot(n, sub(v[0], ray.o)) / dot(n, ray.d.map(f64::from));
+    (!t.is_nan()).then_some(t)
+}
