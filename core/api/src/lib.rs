@@ -11,6 +11,7 @@
 pub mod abi;
 pub mod closure;
 pub mod export;
+pub mod extent;
 pub mod integrator;
 pub mod math;
 pub mod medium;
@@ -26,6 +27,7 @@ pub mod vertex;
 pub use abi::{ParamDecl, PluginKind};
 pub use closure::Closure;
 pub use export::Plugin;
+pub use extent::Extent;
 pub use integrator::{Integrator, Output, SceneView, Stopped, Transport};
 pub use math::{Aabb, Affine, Vec3};
 pub use medium::{Cell, Field, Medium, MediumInfo};

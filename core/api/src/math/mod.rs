@@ -3,6 +3,7 @@
 mod aabb;
 mod affine;
 mod frame;
+pub mod hg;
 pub mod warp;
 
 pub use aabb::Aabb;

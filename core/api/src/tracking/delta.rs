@@ -113,7 +113,8 @@ pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &Flig
     out
 }
 
-/// Weight of what is picked up at a distance `dt` into a step: the lanes' contributions over their mean density.
+/// Weight of what is picked up at a distance `dt` into a step: the lanes' contributions over their mean density, which includes
+/// the path's so far even where this medium doesn't tell lanes apart.
 #[inline(always)]
 fn lane_weight<F: Field>(
     value: F::Lanes,
@@ -123,10 +124,22 @@ fn lane_weight<F: Field>(
     dt: f32,
     u: &FlightDraws,
 ) -> Spectrum {
+    if u.flags & flight_flags::MIXED != 0 {
+        return hero_weight(u);
+    }
     if !F::Lanes::CHROMATIC {
-        return Spectrum::ONE;
+        return Spectrum::splat(1.0 / u.prior.mean(u.lanes));
     }
     let log = log_value - (majorant - F::Lanes::splat(hero)) * dt;
     let reached = (value * (log - F::Lanes::splat(log.max_lane())).exp()).spectrum();
     reached / (reached * u.prior).mean(u.lanes)
+}
+
+/// Weight under [`flight_flags::MIXED`]: the hero lane alone, over the density with which it was chosen and came here.
+#[inline(always)]
+pub fn hero_weight(u: &FlightDraws) -> Spectrum {
+    let mut weight = Spectrum::ZERO;
+    let hero = u.hero as usize & 3;
+    weight[hero] = u.lanes as f32 / u.prior[hero];
+    weight
 }
