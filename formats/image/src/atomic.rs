@@ -1,0 +1,133 @@
+//! Writing files so that a crash leaves the old one or the new one, never half of one.
+
+use std::fs::{File, OpenOptions};
+use std::io::{BufWriter, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::error::Error;
+
+/// Calls `write` with a new file in the folder of `path`, syncs it to the disk and renames it to `path`.
+///
+/// If anything fails, the new file is removed and whatever was at `path` stays. After a crash at most a
+/// file `.NAME.….tmp` is left over. A symbolic link is followed. Folders, devices and pipes are refused.
+pub fn write_atomically(
+    path: impl AsRef<Path>,
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let path = path.as_ref();
+    let target = target(path)?;
+    let (file, temporary) = create_beside(path, &target)?;
+    let guard = RemoveOnDrop(Some(temporary));
+    let mut buffered = BufWriter::with_capacity(1 << 16, file);
+    write(&mut buffered)?;
+    let io = |source| Error::io(path, "cannot write: ", source);
+    let file = buffered.into_inner().map_err(|e| io(e.into_error()))?;
+    file.sync_all().map_err(io)?;
+    drop(file);
+    guard
+        .rename_to(&target)
+        .map_err(|source| Error::io(path, "cannot rename the finished file: ", source))?;
+    sync_folder(&target);
+    Ok(())
+}
+
+/// The file that is meant: where a link leads to.
+fn target(path: &Path) -> Result<PathBuf, Error> {
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(Error::invalid(path, "is a folder, not a file")),
+        Ok(found) if !found.is_file() => {
+            Err(Error::invalid(path, "is a device or a pipe, not a file"))
+        }
+        Ok(_) => std::fs::canonicalize(path).map_err(|source| Error::io(path, "", source)),
+        // Missing, or a link to a missing file: the rename will say if it cannot be.
+        Err(_) => Ok(path.to_path_buf()),
+    }
+}
+
+/// A new file whose name no other process and no other thread uses.
+fn create_beside(path: &Path, target: &Path) -> Result<(File, PathBuf), Error> {
+    static COUNTER: AtomicU32 = AtomicU32::new(0);
+    let Some(name) = target.file_name() else {
+        return Err(Error::invalid(path, "is not the name of a file"));
+    };
+    let folder = target.parent().unwrap_or(Path::new(""));
+    loop {
+        let mut temporary = std::ffi::OsString::from(".");
+        // Long names stay within the 255 bytes that file systems have.
+        let shown: String = name.to_string_lossy().chars().take(40).collect();
+        let number = COUNTER.fetch_add(1, Ordering::Relaxed);
+        temporary.push(format!("{shown}.{}-{number}.tmp", std::process::id()));
+        let temporary = folder.join(temporary);
+        match OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(&temporary)
+        {
+            Ok(file) => return Ok((file, temporary)),
+            // Left over from a crashed process with the same number.
+            Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                return Err(Error::invalid(
+                    path,
+                    format!("the folder {:?} does not exist", display(folder)),
+                ));
+            }
+            Err(source) => {
+                return Err(Error::io(
+                    path,
+                    "cannot create a file in its folder: ",
+                    source,
+                ));
+            }
+        }
+    }
+}
+
+fn display(folder: &Path) -> &Path {
+    if folder.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        folder
+    }
+}
+
+/// The rename itself must survive a power cut. Not all systems can sync folders; the file is safe anyway.
+fn sync_folder(target: &Path) {
+    if let Some(folder) = target.parent()
+        && let Ok(folder) = File::open(display(folder))
+    {
+        let _ = folder.sync_all();
+    }
+}
+
+/// Removes the temporary file unless it has become the real one.
+struct RemoveOnDrop(Option<PathBuf>);
+
+impl RemoveOnDrop {
+    fn rename_to(mut self, target: &Path) -> std::io::Result<()> {
+        if let Some(temporary) = &self.0 {
+            std::fs::rename(temporary, target)?;
+        }
+        self.0 = None;
+        Ok(())
+    }
+}
+
+impl Drop for RemoveOnDrop {
+    fn drop(&mut self) {
+        if let Some(temporary) = &self.0 {
+            let _ = std::fs::remove_file(temporary);
+        }
+    }
+}
+
+/// Writes bytes, for writers that make them in one piece.
+pub(crate) fn write_all(
+    file: &mut BufWriter<File>,
+    path: &Path,
+    bytes: &[u8],
+) -> Result<(), Error> {
+    file.write_all(bytes)
+        .map_err(|source| Error::io(path, "cannot write: ", source))
+}
