@@ -1,5 +1,6 @@
 //! The archive's header and the list of grids.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use crate::encoding::{Compression, Encoding, NODE_CODES};
@@ -53,7 +54,7 @@ pub(crate) fn read(source: &Source, path: &Path) -> Parsed<Listing> {
     let mut position = reader.position();
     let mut damage = None;
     for index in 0..count {
-        let next = next_grid(source, &archive, position);
+        let next = next_grid(source, &archive, &mut reader, position);
         match next {
             Ok((grid, Ok(end))) => {
                 raw.push(grid);
@@ -130,8 +131,13 @@ type Next = Parsed<u64>;
 
 /// Reads the descriptor at `position`, then the grid's metadata and transform. Beside the grid comes
 /// where the next descriptor starts.
-fn next_grid(source: &Source, archive: &Archive, position: u64) -> Parsed<(RawGrid, Next)> {
-    let mut reader = Reader::new(source, position, source.len(), AHEAD);
+fn next_grid(
+    source: &Source,
+    archive: &Archive,
+    reader: &mut Reader<'_>,
+    position: u64,
+) -> Parsed<(RawGrid, Next)> {
+    reader.seek(position, source.len());
     let full_name = reader.string("a grid's name")?;
     let tree_name = reader.string("a grid's type")?;
     let parent = reader.string("a grid's instance parent")?;
@@ -185,15 +191,15 @@ fn next_grid(source: &Source, archive: &Archive, position: u64) -> Parsed<(RawGr
     }
     let (start, end) = (start as u64, end as u64);
 
-    let mut body = Reader::new(source, start, end, AHEAD);
-    let read = describe(&mut body, archive, &mut grid);
+    reader.seek(start, end);
+    let read = describe(reader, archive, &mut grid);
     if archive.has_offsets {
         if let Err(fault) = read {
             grid.refusal = Some(fault);
         }
         return Ok((grid, Ok(end)));
     }
-    let next = read.and_then(|()| pass_stream_grid(source, &body, &mut grid));
+    let next = read.and_then(|()| pass_stream_grid(source, reader.position(), &mut grid));
     if let Err(fault) = &next {
         grid.refusal.get_or_insert_with(|| fault.clone());
     }
@@ -286,10 +292,10 @@ fn unsupported_tree(tree: &str) -> String {
 }
 
 /// In a stream, finds where a grid ends by walking its tree.
-fn pass_stream_grid(source: &Source, body: &Reader<'_>, grid: &mut RawGrid) -> Next {
+fn pass_stream_grid(source: &Source, behind: u64, grid: &mut RawGrid) -> Next {
     if !grid.parent.is_empty() {
-        grid.info.range[1] = body.position();
-        return Ok(body.position());
+        grid.info.range[1] = behind;
+        return Ok(behind);
     }
     let Some(place) = &mut grid.info.tree else {
         let at = grid.info.range[0];
@@ -308,20 +314,12 @@ fn pass_stream_grid(source: &Source, body: &Reader<'_>, grid: &mut RawGrid) -> N
 
 /// Makes names unique, gives instances their parents' trees, and names refusals.
 fn connect(raw: Vec<RawGrid>, path: &Path) -> Vec<GridInfo> {
-    let parents: std::collections::HashMap<_, _> = raw
-        .iter()
-        .filter(|grid| grid.parent.is_empty())
-        .map(|grid| {
-            (
-                grid.full_name.clone(),
-                (
-                    grid.info.tree,
-                    grid.info.tree_type.clone(),
-                    grid.info.saved_as_half,
-                ),
-            )
-        })
-        .collect();
+    let mut parents = HashMap::new();
+    for grid in raw.iter().filter(|grid| grid.parent.is_empty()) {
+        let info = &grid.info;
+        let tree = (info.tree, info.tree_type.clone(), info.saved_as_half);
+        parents.entry(grid.full_name.clone()).or_insert(tree);
+    }
     let finish = |mut grid: RawGrid| {
         grid.info.unique_name = unique(&grid.full_name);
         if !grid.parent.is_empty() {

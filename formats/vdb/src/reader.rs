@@ -13,6 +13,8 @@ pub(crate) struct Reader<'a> {
     /// Index of the next byte in `buffer`.
     next: usize,
     limit: u64,
+    /// Reading ahead stops here, at or behind `limit`.
+    ahead_limit: u64,
     /// How much to read at once, in bytes.
     ahead: usize,
 }
@@ -27,6 +29,7 @@ impl<'a> Reader<'a> {
             base: position,
             next: 0,
             limit,
+            ahead_limit: limit,
             ahead,
         }
     }
@@ -36,6 +39,20 @@ impl<'a> Reader<'a> {
         self.base + self.next as u64
     }
 
+    /// Goes to `position` and reads up to `limit` from there (not beyond the first limit), using what
+    /// is already in memory.
+    pub fn seek(&mut self, position: u64, limit: u64) {
+        self.limit = limit.min(self.ahead_limit);
+        match position.checked_sub(self.base) {
+            Some(next) if next <= self.buffer.len() as u64 => self.next = next as usize,
+            _ => {
+                self.buffer.clear();
+                self.base = position;
+                self.next = 0;
+            }
+        }
+    }
+
     /// Bytes left in the range.
     pub fn left(&self) -> u64 {
         self.limit.saturating_sub(self.position())
@@ -43,7 +60,8 @@ impl<'a> Reader<'a> {
 
     /// The next `count` bytes; `what` names them if they are not there.
     pub fn bytes(&mut self, count: usize, what: &str) -> Parsed<&[u8]> {
-        if self.buffer.len() - self.next < count {
+        let buffered = self.buffer.len() - self.next;
+        if buffered < count || self.left() < count as u64 {
             self.fill(count, what)?;
         }
         let start = self.next;
@@ -62,9 +80,10 @@ impl<'a> Reader<'a> {
                 ),
             ));
         }
-        // Keep what is buffered, then read on: `want` is at most what the range holds.
+        // Keep what is buffered, then read on: `want` is at most what the file holds.
         let kept = self.buffer.len() - self.next;
-        let want = (count.max(self.ahead) as u64).min(left) as usize;
+        let there = self.ahead_limit - self.position();
+        let want = (count.max(self.ahead) as u64).min(there) as usize;
         self.buffer.copy_within(self.next.., 0);
         self.base += self.next as u64;
         self.next = 0;
