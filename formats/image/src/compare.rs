@@ -157,13 +157,14 @@ pub fn compare(
         let mut pixel = 0.0;
         for c in 0..3 {
             let square = (a[c] - b[c]).powi(2);
-            mse += square / (3.0 * n);
+            mse += square;
             pixel += square / (b[c] * b[c] + DARK) / 3.0;
-            mean[c] += a[c] / n;
-            reference_mean[c] += b[c] / n;
+            mean[c] += a[c];
+            reference_mean[c] += b[c];
         }
         relative.push(pixel);
     }
+    let (mean, reference_mean) = (mean.map(|m| m / n), reference_mean.map(|m| m / n));
     relative.sort_by(f64::total_cmp);
     let kept = pixels - ((pixels as f64 * TRIM).ceil() as usize).min(pixels - 1);
     let average = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
@@ -171,7 +172,7 @@ pub fn compare(
     Ok(Comparison {
         pixels,
         not_finite: finite.len() - pixels,
-        mse,
+        mse: mse / (3.0 * n),
         rel_mse: average(&relative[..kept]),
         rel_mse_untrimmed: average(&relative),
         mean,
