@@ -1,0 +1,133 @@
+//! The density of a closure integrated over a grid on the sphere.
+
+use super::{Measured, wide};
+use crate::quadrature::gauss;
+use core::f64::consts::{FRAC_PI_2, PI};
+use resolvent_api::math::DVec3;
+use resolvent_api::{Mode, Scatter, Vec3};
+
+/// Rings of constant polar angle between a pole and the equator, spaced logarithmically so that a peak of any width at the
+/// pole is resolved (|g| = 0.9999 has one of 10⁻⁴).
+const RINGS: usize = 140;
+/// Innermost ring, radians.
+const INNERMOST: f64 = 1e-6;
+/// Sectors of azimuth.
+pub const SECTORS: usize = 12;
+/// Bands of polar angle in the histogram, of about equal probability.
+pub const BANDS: usize = 24;
+
+/// The density over the sphere for one `wo`.
+pub struct Density {
+    /// The known direction.
+    pub wo: Vec3,
+    /// How values weigh directions.
+    pub measured: Measured,
+    /// What is carried.
+    pub mode: Mode,
+    /// ∫ forward dω: 1, or less where sampling may fail.
+    pub total: f64,
+    /// ∫ f |cos| dω per lane: the albedo.
+    pub albedo: [f64; 4],
+    /// ∫ f |cos| (axis·wi) dω of lane 0, over the albedo: the mean cosine.
+    pub mean_cosine: f64,
+    /// Probability of each band and sector, band by band.
+    pub bins: Vec<f64>,
+    frame: [DVec3; 3],
+    /// Upper polar angle of each band.
+    edges: Vec<f64>,
+}
+
+/// Polar angles that separate the rings, from pole to pole.
+fn rings() -> Vec<f64> {
+    let half = (0..=RINGS)
+        .map(|i| INNERMOST * (FRAC_PI_2 / INNERMOST).powf(i as f64 / RINGS as f64))
+        .collect::<Vec<_>>();
+    let mut out = vec![0.0];
+    out.extend(&half);
+    out.extend(half.iter().rev().skip(1).map(|t| PI - t));
+    out.push(PI);
+    out
+}
+
+impl Density {
+    /// Integrates `k` for `wo`; the grid's poles are ±`axis`.
+    pub fn new(k: &impl Scatter, measured: Measured, wo: Vec3, axis: Vec3, mode: Mode) -> Self {
+        let n = wide(axis).normalize();
+        let s = n.any_orthonormal_vector();
+        let frame = [s, n.cross(s), n];
+        let rings = rings();
+        let (mut albedo, mut cosine) = ([0.0; 4], 0.0);
+        let mut mass = vec![[0.0; SECTORS]; rings.len() - 1];
+        for (ring, mass) in rings.windows(2).zip(&mut mass) {
+            for (theta, dtheta) in gauss(ring[0], ring[1]) {
+                let (sin, cos) = theta.sin_cos();
+                for (j, mass) in mass.iter_mut().enumerate() {
+                    let step = 2.0 * PI / SECTORS as f64;
+                    for (phi, dphi) in gauss(j as f64 * step, (j + 1) as f64 * step) {
+                        let w = frame[0] * (sin * phi.cos())
+                            + frame[1] * (sin * phi.sin())
+                            + frame[2] * cos;
+                        let wi = w.as_vec3();
+                        let e = k.eval(wo, wi, mode);
+                        let omega = sin * dtheta * dphi;
+                        *mass += f64::from(e.forward) * omega;
+                        let reflected = measured.cosine(wi) * omega;
+                        for (a, f) in albedo.iter_mut().zip(e.f.0) {
+                            *a += f64::from(f) * reflected;
+                        }
+                        cosine += f64::from(e.f[0]) * reflected * cos;
+                    }
+                }
+            }
+        }
+        let ring_mass: Vec<f64> = mass.iter().map(|m| m.iter().sum()).collect();
+        let total: f64 = ring_mass.iter().sum();
+        // Bands end at the ring where their share of the probability is reached.
+        let (mut edges, mut bins) = (Vec::new(), Vec::new());
+        let (mut below, mut band) = (0.0, [0.0; SECTORS]);
+        for (i, m) in mass.iter().enumerate() {
+            below += ring_mass[i];
+            band.iter_mut().zip(m).for_each(|(b, m)| *b += m);
+            // The last band takes all that is left: a sliver at the far pole would expect next to nothing, yet hold the one
+            // number in 2²⁴ that maps to the pole itself.
+            let full =
+                edges.len() + 1 < BANDS && below >= total * (edges.len() + 1) as f64 / BANDS as f64;
+            if full || i + 1 == mass.len() {
+                edges.push(rings[i + 1]);
+                bins.extend(band);
+                band = [0.0; SECTORS];
+            }
+        }
+        Self {
+            wo,
+            measured,
+            mode,
+            total,
+            albedo,
+            mean_cosine: if albedo[0] > 0.0 {
+                cosine / albedo[0]
+            } else {
+                0.0
+            },
+            bins,
+            frame,
+            edges,
+        }
+    }
+
+    /// The bin of a direction.
+    pub fn bin(&self, wi: Vec3) -> usize {
+        let w = wide(wi);
+        let local = self.frame.map(|axis| axis.dot(w));
+        let theta = local[0].hypot(local[1]).atan2(local[2]);
+        let band = self.edges.partition_point(|&e| e < theta);
+        let turn = local[1].atan2(local[0]) / (2.0 * PI);
+        let sector = ((turn - turn.floor()) * SECTORS as f64) as usize;
+        band.min(self.edges.len() - 1) * SECTORS + sector.min(SECTORS - 1)
+    }
+
+    /// Cosine between a direction and the grid's axis.
+    pub fn cosine(&self, wi: Vec3) -> f64 {
+        self.frame[2].dot(wide(wi))
+    }
+}
