@@ -9,13 +9,16 @@
 
 #[path = "../tests/hostile/mod.rs"]
 mod hostile;
+#[path = "../tests/mutate/mod.rs"]
+mod mutate;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use hostile::{Outcome, Random, allowance, memory, mutate, read_everything, seeds};
+use hostile::{Outcome, allowance, memory, read_everything};
+use mutate::{Random, mutate, seeds};
 
 #[global_allocator]
 static ALLOCATOR: memory::Counting = memory::Counting;

@@ -93,9 +93,9 @@ fn archive(reader: &mut Reader<'_>) -> Parsed<Archive> {
     let version = reader.u32("the version")?;
     if !VERSIONS.contains(&version) {
         let remedy = if version < *VERSIONS.start() {
-            "write it again with a newer OpenVDB (vdb_print or vdb_tool of a version that reads it)"
+            "convert it with an OpenVDB that reads it and writes a newer format"
         } else {
-            "write it with an OpenVDB that uses format 224, the usual one"
+            "write it with an OpenVDB that uses format 224, as versions 7 to 12 do"
         };
         let reason = format!("file format {version} is not supported, only 221 to 225; {remedy}");
         return Err(Fault::unsupported(8, reason));
@@ -142,7 +142,7 @@ fn next_grid(
     let tree_name = reader.string("a grid's type")?;
     let parent = reader.string("a grid's instance parent")?;
     let at = reader.position();
-    let offsets = [(); 3].map(|()| reader.i64("a grid's offsets"));
+    let offsets = [(); 3].map(|()| reader.i64("a grid's descriptor"));
     let [start, _, end] = offsets;
     let (mut start, mut end) = (start?, end?);
     if !archive.has_offsets {

@@ -21,12 +21,13 @@ pub(crate) struct Source {
 
 impl Source {
     pub fn open(path: &Path) -> Parsed<Self> {
-        let file = fs::File::open(path).map_err(|e| Fault::io(None, e))?;
-        let about = file.metadata().map_err(|e| Fault::io(None, e))?;
-        if about.is_dir() {
-            let error = io::Error::new(io::ErrorKind::IsADirectory, "is a directory, not a file");
+        // Looked at before it is opened: opening a pipe would wait for its other end.
+        let about = fs::metadata(path).map_err(|e| Fault::io(None, e))?;
+        if !about.is_file() {
+            let error = io::Error::new(io::ErrorKind::InvalidInput, "not a regular file");
             return Err(Fault::io(None, error));
         }
+        let file = fs::File::open(path).map_err(|e| Fault::io(None, e))?;
         Ok(Self {
             store: Store::Disk(file),
             length: about.len(),

@@ -1,41 +1,10 @@
-//! Damaged files by the thousand: seeds, mutations, and what reading them may cost.
+//! Reading damaged files, and what that may cost.
 
 pub mod memory;
-mod mutate;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::{Path, PathBuf};
 
 use resolvent_vdb::{File, Halves, Serial, Tree};
-
-pub use mutate::{Random, mutate};
-
-/// A sound or damaged file to start from.
-pub struct Seed {
-    pub name: String,
-    pub bytes: Vec<u8>,
-}
-
-/// The corpus and the smaller files of other programs.
-pub fn seeds() -> Vec<Seed> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
-    let mut paths: Vec<PathBuf> = ["corpus", "real"]
-        .iter()
-        .flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap())
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|kind| kind == "vdb"))
-        .collect();
-    paths.sort();
-    let seed = |path: PathBuf| Seed {
-        name: path.file_name().unwrap().to_string_lossy().into_owned(),
-        bytes: std::fs::read(&path).unwrap(),
-    };
-    paths
-        .into_iter()
-        .map(seed)
-        .filter(|seed| seed.bytes.len() < 250_000)
-        .collect()
-}
 
 /// What became of one input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,6 +1,33 @@
-//! Seeded mutations of files.
+//! Files to start from, and seeded mutations of them.
 
-use super::Seed;
+use std::path::{Path, PathBuf};
+
+/// A sound or damaged file to start from.
+pub struct Seed {
+    pub name: String,
+    pub bytes: Vec<u8>,
+}
+
+/// The corpus and the smaller files of other programs.
+pub fn seeds() -> Vec<Seed> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let mut paths: Vec<PathBuf> = ["corpus", "real"]
+        .iter()
+        .flat_map(|folder| std::fs::read_dir(root.join(folder)).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|kind| kind == "vdb"))
+        .collect();
+    paths.sort();
+    let seed = |path: PathBuf| Seed {
+        name: path.file_name().unwrap().to_string_lossy().into_owned(),
+        bytes: std::fs::read(&path).unwrap(),
+    };
+    paths
+        .into_iter()
+        .map(seed)
+        .filter(|seed| seed.bytes.len() < 250_000)
+        .collect()
+}
 
 /// SplitMix64 (Steele, Lea and Flood 2014): small, and the same everywhere.
 pub struct Random(pub u64);
