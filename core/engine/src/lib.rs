@@ -1,1 +1,17 @@
-//! Resolvent: engine.
+//! Resolvent's host: from a scene's description to a film.
+//!
+//! [`plugin`] finds and loads plugins, [`scene`] builds and plans the scene and is G for the integrators, [`geometry`] traces rays,
+//! [`light`] has the lights, [`film`] the sums, [`render()`] divides the work. The engine never names a concrete plugin.
+
+mod camera;
+mod error;
+pub mod film;
+pub mod geometry;
+pub mod light;
+pub mod plugin;
+mod render;
+pub mod scene;
+mod texture;
+
+pub use error::{Error, Result};
+pub use render::{Broken, Goal, Progress, Rendered, Settings, render, with_threads};

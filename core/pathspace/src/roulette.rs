@@ -14,3 +14,12 @@ pub const TARGET: f32 = 0.5;
 pub fn survival(w: f32) -> f32 {
     if w >= THRESHOLD { 1.0 } else { w / TARGET }
 }
+
+/// Phase function value, relative to isotropic scattering, below which a connection plays roulette.
+pub const CONNECTION_THRESHOLD: f32 = 1.0;
+
+/// Probability of going on with a connection whose phase function value is `f` (sr⁻¹).
+#[inline(always)]
+pub fn connection(f: f32) -> f32 {
+    (f * (4.0 * core::f32::consts::PI / CONNECTION_THRESHOLD)).min(1.0)
+}

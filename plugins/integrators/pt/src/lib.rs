@@ -1,1 +1,102 @@
-//! Resolvent: pt.
+//! Volumetric path tracing: the Neumann series of G K, summed from the sensor.
+//!
+//! At every vertex the light that a connection finds and the light that scattering finds are combined by the balance heuristic, over
+//! techniques and lanes, exactly on null-collision paths (Miller et al. 2019). Russian roulette ends paths; there is no limit on
+//! bounces unless one is asked for.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `max_depth` | int ≥ −1 | −1 | scattering events after which a path ends, −1: none. A limit makes the picture darker than it should be |
+//! | `orders` | int ≥ −1 | −1 | only light scattered exactly this often is kept, −1: all |
+//!
+//! ```json
+//! { "integrator": { "plugin": "pt", "params": { "max_depth": -1 } } }
+//! ```
+
+mod kernel;
+
+use kernel::Kernel;
+use resolvent_api::abi::{ParamDecl, PixelSample, Tile};
+use resolvent_api::integrator::Outcome;
+use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
+use resolvent_pathspace::sampler::Sampler;
+
+/// The integrator.
+struct PathTracer {
+    max_depth: u32,
+    order: Option<u32>,
+}
+
+impl Plugin for PathTracer {
+    const NAME: &'static str = "pt";
+    const SUMMARY: &'static str = "volumetric path tracing with next-event estimation and MIS";
+    const PARAMS: &'static [ParamDecl] = &[
+        Decl::int(
+            "max_depth",
+            "scattering events after which a path ends; -1: no limit",
+        )
+        .default("-1")
+        .at_least(-1.0)
+        .build(),
+        Decl::int(
+            "orders",
+            "keep only light scattered exactly this often; -1: all",
+        )
+        .default("-1")
+        .at_least(-1.0)
+        .build(),
+    ];
+
+    fn create(params: &Params<'_>) -> Result<Self, Error> {
+        let unlimited = |v: i64| u32::try_from(v).ok();
+        let order = unlimited(params.int("orders")?);
+        let limit = unlimited(params.int("max_depth")?).unwrap_or(u32::MAX);
+        Ok(Self {
+            max_depth: limit.min(order.unwrap_or(u32::MAX)),
+            order,
+        })
+    }
+}
+
+impl Integrator for PathTracer {
+    fn render(&self, scene: &SceneView<'_>, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
+        let kernel = Kernel {
+            scene,
+            max_depth: self.max_depth,
+            order: self.order,
+        };
+        // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
+        if scene.is_grey() {
+            each_sample(tile, scene, out, |s, film, features| {
+                kernel.path::<false>(s, film, features)
+            })
+        } else {
+            each_sample(tile, scene, out, |s, film, features| {
+                kernel.path::<true>(s, film, features)
+            })
+        }
+    }
+}
+
+/// Runs `path` for every sample of every pixel of a tile, in order.
+fn each_sample(
+    tile: &Tile,
+    scene: &SceneView<'_>,
+    out: &mut Output<'_>,
+    path: impl Fn(&Sampler, [f32; 2], bool) -> Outcome<PixelSample>,
+) -> Outcome<()> {
+    let features = tile.features != 0;
+    for y in tile.min[1]..tile.max[1] {
+        for x in tile.min[0]..tile.max[0] {
+            let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
+            for i in tile.sample_begin..tile.sample_end {
+                let sampler = Sampler::new(tile.seed, pixel, i, scene.lanes());
+                let sample = path(&sampler, [x as f32, y as f32], features)?;
+                out.add(x, y, &sample)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+resolvent_api::export_plugin!(integrator, PathTracer);

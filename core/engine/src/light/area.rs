@@ -1,0 +1,185 @@
+//! Emitting shapes.
+
+use super::{Distribution, per_solid_angle};
+use crate::geometry::{Quad, Sphere, TriangleMesh};
+use resolvent_api::Spectrum;
+use resolvent_api::math::{Frame, Vec3, warp};
+use resolvent_api::vertex::{LightSample, NONE};
+use std::f32::consts::PI;
+
+/// An emitting shape.
+pub struct Area {
+    /// Index of the shape it lies on.
+    pub shape: u32,
+    /// W·sr⁻¹·m⁻².
+    pub radiance: Spectrum,
+    /// Emits on both sides of the surface, else only on the side of the normal.
+    pub two_sided: bool,
+    /// Where points are chosen.
+    pub form: AreaShape,
+    /// Surface area.
+    pub area: f32,
+}
+
+/// The form of an emitting shape.
+pub enum AreaShape {
+    /// A parallelogram; points are uniform in area.
+    Quad(Quad),
+    /// A sphere; directions are uniform in the cone it fills as seen from outside, points uniform in area from inside.
+    Sphere(Sphere),
+    /// Triangles; points are uniform in area.
+    Mesh(TriangleMesh, Distribution),
+}
+
+impl Area {
+    /// An emitting parallelogram.
+    pub fn quad(shape: u32, quad: Quad, radiance: Spectrum, two_sided: bool) -> Self {
+        let area = quad
+            .edge_u
+            .as_dvec3()
+            .cross(quad.edge_v.as_dvec3())
+            .length() as f32;
+        Self {
+            shape,
+            radiance,
+            two_sided,
+            form: AreaShape::Quad(quad),
+            area,
+        }
+    }
+
+    /// An emitting sphere.
+    pub fn sphere(shape: u32, sphere: Sphere, radiance: Spectrum) -> Self {
+        let area = 4.0 * PI * sphere.radius * sphere.radius;
+        Self {
+            shape,
+            radiance,
+            two_sided: false,
+            form: AreaShape::Sphere(sphere),
+            area,
+        }
+    }
+
+    /// Emitting triangles; those without area are never chosen.
+    pub fn mesh(shape: u32, mesh: TriangleMesh, radiance: Spectrum) -> Self {
+        let areas: Vec<f64> = mesh
+            .indices
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3());
+                0.5 * (b - a).cross(c - a).length()
+            })
+            .collect();
+        let area = areas.iter().sum::<f64>() as f32;
+        let distribution = Distribution::new(&areas);
+        Self {
+            shape,
+            radiance,
+            two_sided: false,
+            form: AreaShape::Mesh(mesh, distribution),
+            area,
+        }
+    }
+
+    /// Radiant power, W.
+    pub fn power(&self, lanes: u32) -> f32 {
+        let sides = if self.two_sided { 2.0 } else { 1.0 };
+        sides * PI * self.area * self.radiance.mean(lanes)
+    }
+
+    /// Chooses a point for `from`; `None` if it shows nothing there.
+    pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let (p, ng, prim, density) = match &self.form {
+            AreaShape::Quad(q) => {
+                let p = q.corner + q.edge_u * u[0] + q.edge_v * u[1];
+                let ng = q.edge_u.cross(q.edge_v).normalize_or_zero();
+                let density = per_solid_angle(1.0 / self.area, from, p, ng);
+                (p, ng, u32::from(u[1] > u[0]), density)
+            }
+            AreaShape::Mesh(mesh, distribution) => {
+                let (i, rest) = distribution.sample(u[0])?;
+                let [a, b, c] = mesh.indices[i].map(|i| mesh.positions[i as usize]);
+                // Uniform on the triangle by folding the square over its diagonal.
+                let (mut s, mut t) = (rest, u[1]);
+                if s + t > 1.0 {
+                    (s, t) = (1.0 - s, 1.0 - t);
+                }
+                let p = a + (b - a) * s + (c - a) * t;
+                let ng = (b - a).cross(c - a).normalize_or_zero();
+                (
+                    p,
+                    ng,
+                    i as u32,
+                    per_solid_angle(1.0 / self.area, from, p, ng),
+                )
+            }
+            AreaShape::Sphere(s) => return self.sample_sphere(s, from, u),
+        };
+        self.finish(from, p, ng, prim, density)
+    }
+
+    fn finish(
+        &self,
+        from: Vec3,
+        p: Vec3,
+        ng: Vec3,
+        prim: u32,
+        density: f32,
+    ) -> Option<LightSample> {
+        let d = p - from;
+        let distance = d.length();
+        let shows = self.two_sided || ng.dot(d) < 0.0;
+        if !(shows && distance > 0.0 && density > 0.0 && density.is_finite()) {
+            return None;
+        }
+        Some(LightSample {
+            wi: (d / distance).into(),
+            distance,
+            radiance: self.radiance,
+            density,
+            light: NONE,
+            flags: 0,
+            p: p.into(),
+            ng: ng.into(),
+            primitive: [self.shape, prim],
+            // Half an ulp for each of the few operations that gave a coordinate, relative to the terms involved.
+            p_error: (p.abs() * 6e-7).into(),
+        })
+    }
+
+    fn sample_sphere(&self, s: &Sphere, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let to_centre = s.center - from;
+        let d2 = to_centre.length_squared();
+        let Some(one_minus_cos) = cone_of(s, d2) else {
+            let n = warp::sphere(u);
+            let p = s.center + n * s.radius;
+            return self.finish(from, p, n, 0, per_solid_angle(1.0 / self.area, from, p, n));
+        };
+        let frame = Frame::around(to_centre.normalize());
+        let w = frame.to_world(warp::cone(u, one_minus_cos));
+        // Nearest intersection along w, from the centre's side to keep the digits of a small sphere far away.
+        let along = to_centre.dot(w);
+        let off = to_centre - w * along;
+        let half = (s.radius * s.radius - off.length_squared()).max(0.0).sqrt();
+        let n = (-off - w * half).normalize_or_zero();
+        let p = s.center + n * s.radius;
+        self.finish(from, p, n, 0, 1.0 / (2.0 * PI * one_minus_cos))
+    }
+
+    /// Density (sr⁻¹) with which [`Area::sample`] at `from` finds the point `at` with normal `ng`.
+    pub fn density(&self, from: Vec3, at: Vec3, ng: Vec3) -> f32 {
+        if let AreaShape::Sphere(s) = &self.form
+            && let Some(one_minus_cos) = cone_of(s, (s.center - from).length_squared())
+        {
+            return 1.0 / (2.0 * PI * one_minus_cos);
+        }
+        per_solid_angle(1.0 / self.area, from, at, ng)
+    }
+}
+
+/// 1 − cosine of the half-angle a sphere fills at a squared distance `d2` of its centre; `None` from inside.
+fn cone_of(s: &Sphere, d2: f32) -> Option<f32> {
+    let sin2 = s.radius * s.radius / d2;
+    // sin²/(1 + cos) = 1 − cos without cancellation.
+    (sin2 < 1.0).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+}

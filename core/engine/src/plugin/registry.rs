@@ -1,0 +1,224 @@
+//! Finding plugins by kind and name along a search path; a plugin is loaded when it is named, and not before.
+
+use super::instance::{Instance, nested_blocks};
+use super::load::Plugin;
+use crate::error::{Error, Result};
+use resolvent_api::{Affine, PluginKind};
+use resolvent_scene::{PluginBlock, Problem, Scene, nearest};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+/// Environment variable with further folders.
+pub const PATH_VARIABLE: &str = "RESOLVENT_PLUGIN_PATH";
+
+/// The search path and the plugins loaded so far.
+pub struct Registry {
+    folders: Vec<PathBuf>,
+    loaded: Mutex<BTreeMap<PathBuf, Arc<Plugin>>>,
+}
+
+impl Registry {
+    /// Searches `first`, then the folders of `RESOLVENT_PLUGIN_PATH`, then beside the executable (and in `plugins` and
+    /// `../lib/resolvent` from there).
+    pub fn new(first: &[PathBuf]) -> Self {
+        let mut folders = first.to_vec();
+        if let Some(path) = std::env::var_os(PATH_VARIABLE) {
+            folders.extend(std::env::split_paths(&path).filter(|p| !p.as_os_str().is_empty()));
+        }
+        if let Some(beside) = std::env::current_exe()
+            .ok()
+            .as_deref()
+            .and_then(Path::parent)
+        {
+            folders.push(beside.to_path_buf());
+            folders.push(beside.join("plugins"));
+            folders.push(beside.join("../lib/resolvent"));
+            // Test executables stand one folder below the libraries they are built with.
+            if beside.ends_with("deps") || beside.ends_with("examples") {
+                folders.extend(beside.parent().map(Path::to_path_buf));
+            }
+        }
+        Self {
+            folders,
+            loaded: Mutex::default(),
+        }
+    }
+
+    /// The search path.
+    pub fn folders(&self) -> &[PathBuf] {
+        &self.folders
+    }
+
+    /// The file name of a plugin's library: `libresolvent_medium_vdb.so` for the medium `vdb`.
+    pub fn file_name(kind: PluginKind, name: &str) -> String {
+        use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+        format!(
+            "{DLL_PREFIX}resolvent_{}_{}{DLL_SUFFIX}",
+            kind.name(),
+            name.replace('-', "_")
+        )
+    }
+
+    /// Every library in the search path whose name is that of a plugin, the first of each name only, without loading any.
+    pub fn available(&self) -> Vec<(PluginKind, String, PathBuf)> {
+        let mut out: Vec<(PluginKind, String, PathBuf)> = Vec::new();
+        for folder in &self.folders {
+            let Ok(entries) = std::fs::read_dir(folder) else {
+                continue;
+            };
+            let mut paths: Vec<_> = entries.flatten().map(|e| e.path()).collect();
+            paths.sort();
+            for path in paths {
+                let Some((kind, name)) = Self::parse(&path) else {
+                    continue;
+                };
+                if !out.iter().any(|(k, n, _)| *k == kind && *n == name) {
+                    out.push((kind, name, path));
+                }
+            }
+        }
+        out.sort();
+        out
+    }
+
+    fn parse(path: &Path) -> Option<(PluginKind, String)> {
+        use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+        let file = path.file_name()?.to_str()?;
+        let stem = file.strip_prefix(DLL_PREFIX)?.strip_suffix(DLL_SUFFIX)?;
+        let rest = stem.strip_prefix("resolvent_")?;
+        PluginKind::ALL.into_iter().find_map(|kind| {
+            let name = rest.strip_prefix(kind.name())?.strip_prefix('_')?;
+            Some((kind, name.replace('_', "-")))
+        })
+    }
+
+    /// The plugin `name` of a kind, loaded if it was not yet.
+    ///
+    /// # Errors
+    /// If it is not found (with what is, and the nearest name) or cannot be loaded.
+    pub fn find(&self, kind: PluginKind, name: &str) -> Result<Arc<Plugin>> {
+        let file = Self::file_name(kind, name);
+        for folder in &self.folders {
+            let path = folder.join(&file);
+            if path.is_file() {
+                return self.load(kind, &path);
+            }
+        }
+        let known: Vec<String> = self
+            .available()
+            .into_iter()
+            .filter(|(k, ..)| *k == kind)
+            .map(|(_, n, _)| n)
+            .collect();
+        let near = nearest(name, known.iter().map(String::as_str))
+            .map_or_else(String::new, |n| format!("; did you mean '{n}'?"));
+        let known = if known.is_empty() {
+            "none".into()
+        } else {
+            known.join(", ")
+        };
+        let folders: Vec<_> = self
+            .folders
+            .iter()
+            .map(|f| f.display().to_string())
+            .collect();
+        Err(Error::Plugin(format!(
+            "there is no {} plugin '{name}'{near} Found: {known}. Searched for {file} in: {}",
+            kind.name(),
+            folders.join(", ")
+        )))
+    }
+
+    /// The plugin in the library at `path`, loaded if it was not yet; it must be of the given kind.
+    ///
+    /// # Errors
+    /// If it cannot be loaded or is of another kind.
+    pub fn load(&self, kind: PluginKind, path: &Path) -> Result<Arc<Plugin>> {
+        let plugin = self.open(path)?;
+        if plugin.kind != kind {
+            return Err(Error::Plugin(format!(
+                "{}: is a {} plugin where a {} plugin is needed",
+                path.display(),
+                plugin.kind.name(),
+                kind.name()
+            )));
+        }
+        Ok(plugin)
+    }
+
+    /// The plugin in the library at `path`, of any kind, loaded if it was not yet.
+    ///
+    /// # Errors
+    /// If it cannot be loaded.
+    pub fn open(&self, path: &Path) -> Result<Arc<Plugin>> {
+        let key = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        let mut loaded = self.loaded.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some(plugin) = loaded.get(&key) {
+            return Ok(plugin.clone());
+        }
+        let plugin = Arc::new(Plugin::open(path)?);
+        loaded.insert(key, plugin.clone());
+        Ok(plugin)
+    }
+
+    /// The plugins loaded so far.
+    pub fn loaded(&self) -> Vec<Arc<Plugin>> {
+        self.loaded
+            .lock()
+            .unwrap_or_else(|e| e.into_inner())
+            .values()
+            .cloned()
+            .collect()
+    }
+
+    /// Makes the instance a block of the scene describes, nested plugins first.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the block, with its place in the scene.
+    pub fn instantiate(
+        &self,
+        kind: PluginKind,
+        block: &PluginBlock,
+        scene: &Scene,
+        to_world: &Affine,
+        lanes: u32,
+    ) -> Result<Instance> {
+        let file = scene.source.file.as_path();
+        let placed = |e: Error| match e {
+            Error::Plugin(why) => Error::from(Problem::new(file, block.place.clone(), why)),
+            other => other,
+        };
+        let plugin = if block.is_path() {
+            self.load(kind, &scene.resolve(&block.plugin))
+        } else {
+            self.find(kind, &block.plugin)
+        }
+        .map_err(placed)?;
+        let checked = plugin.decl.check(block, file).map_err(Error::Scene)?;
+        let mut nested = Vec::new();
+        for (name, kind, inner) in nested_blocks(&plugin, &checked) {
+            let kind = PluginKind::ALL
+                .into_iter()
+                .find(|k| k.name() == kind)
+                .ok_or_else(|| {
+                    Error::Plugin(format!(
+                        "{}: '{name}' asks for the unknown kind '{kind}'",
+                        plugin.title()
+                    ))
+                })?;
+            let instance = self.instantiate(kind, inner, scene, to_world, lanes)?;
+            nested.push((name, Arc::new(instance)));
+        }
+        let resolve = |p: &str| scene.resolve(p);
+        Instance::create(
+            plugin,
+            &checked,
+            nested,
+            to_world,
+            lanes,
+            &resolve,
+            (file, &block.place),
+        )
+    }
+}

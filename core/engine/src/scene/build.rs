@@ -1,0 +1,424 @@
+//! From a description to a scene: plugins, geometry, lights, and the facts that choose the kernels.
+
+use super::shapes::{Wide, affine};
+use super::{Material, PlacedMedium, Surface};
+use crate::camera::Camera;
+use crate::error::{Error, Result};
+use crate::geometry::{Accel, Geometry, Shape};
+use crate::light::{Area, ImageEnvironment, Light, Lights};
+use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
+use glam::DVec3;
+use resolvent_api::abi::scene_traits;
+use resolvent_api::medium::medium_traits;
+use resolvent_api::{Aabb, Affine, PluginKind, Spectrum, Vec3};
+use resolvent_scene as describe;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Lanes in use: red, green and blue.
+pub const RGB_LANES: u32 = 3;
+
+/// Interior media are kept as bits of a set.
+const MAX_INTERIORS: usize = 64;
+
+/// What building a scene took.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Preparation {
+    /// Seconds for media (reading their files included).
+    pub media_seconds: f64,
+    /// Seconds for geometry.
+    pub geometry_seconds: f64,
+    /// Seconds for everything, plugins and lights included.
+    pub total_seconds: f64,
+}
+
+/// A scene, ready to be rendered.
+pub struct Scene {
+    pub(crate) accel: Option<Accel>,
+    pub(crate) surfaces: Vec<Surface>,
+    pub(crate) has_null_surfaces: bool,
+    /// Materials in use.
+    pub materials: Vec<Material>,
+    /// Media in use.
+    pub media: Vec<PlacedMedium>,
+    pub(crate) lights: Lights,
+    pub(crate) camera: Camera,
+    /// Bits of [`scene_traits`].
+    pub traits: u32,
+    /// Lanes in use.
+    pub lanes: u32,
+    /// The point of the world that is the origin of everything here.
+    pub centre: DVec3,
+    /// What building took.
+    pub preparation: Preparation,
+}
+
+impl Scene {
+    /// Builds what `scene` describes, with plugins from `registry`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the scene or its plugins, with its place.
+    pub fn build(scene: &describe::Scene, registry: &Registry) -> Result<Self> {
+        let start = Instant::now();
+        let lanes = RGB_LANES;
+        let wide: Vec<Wide> = scene
+            .shapes
+            .iter()
+            .map(|s| Wide::read(scene, &s.geometry))
+            .collect::<Result<_>>()?;
+        let camera_to_world = affine(&scene.camera.to_world());
+        let centre = centre(scene, &wide, camera_to_world.translation);
+        let to_local = Affine::from_translation(-centre);
+
+        let mut materials = Vec::new();
+        let mut media_of: Vec<Option<u32>> = vec![None; scene.media.len()];
+        let mut media = Vec::new();
+        let free: Vec<&str> = scene.free_standing().map(|(name, _)| name).collect();
+        let media_start = Instant::now();
+        for (k, (name, described)) in scene.media.iter().enumerate() {
+            let to_world = to_local.after(&affine(&described.transform));
+            let instance = registry.instantiate(
+                PluginKind::Medium,
+                &described.block,
+                scene,
+                &to_world,
+                lanes,
+            )?;
+            let medium = ForeignMedium::new(instance)?;
+            let free = free.contains(&name.as_str());
+            if medium.info.traits & medium_traits::EMPTY != 0 {
+                continue;
+            }
+            if free && !medium.info.bounds.extent().is_finite() {
+                return Err(describe::Problem::new(
+                    &scene.source.file,
+                    described.block.place.clone(),
+                    format!("the medium '{name}' has no bounds of its own: give it some, or make it a shape's \"interior\""),
+                )
+                .into());
+            }
+            media_of[k] = Some(media.len() as u32);
+            media.push(PlacedMedium {
+                name: name.clone(),
+                medium,
+                free,
+            });
+        }
+        let media_seconds = media_start.elapsed().as_secs_f64();
+        if media.len() > MAX_INTERIORS && media.iter().any(|m| !m.free) {
+            return Err(Error::Input(format!(
+                "{} media with interiors among them; interiors work with at most {MAX_INTERIORS} media",
+                media.len()
+            )));
+        }
+
+        let geometry_start = Instant::now();
+        let mut lights: Vec<Light> = Vec::new();
+        let mut surfaces = Vec::new();
+        let mut shapes = Vec::new();
+        for (described, wide) in scene.shapes.iter().zip(wide) {
+            let shape = wide.narrow(centre);
+            let material = match &described.material {
+                Some(name) => Some(material(name, scene, registry, lanes, &mut materials)?),
+                None => None,
+            };
+            let interior = described
+                .interior
+                .as_deref()
+                .and_then(|name| scene.media.get_index_of(name))
+                .and_then(|k| media_of[k]);
+            let filled = described.interior.is_some();
+            let light = described
+                .emission
+                .filter(|e| e.iter().any(|v| *v > 0.0))
+                .map(|e| {
+                    lights.push(Light::Area(area(&shape, shapes.len() as u32, spectrum(e))));
+                    lights.len() as u32 - 1
+                });
+            let null = light.is_none()
+                && match material {
+                    None => filled,
+                    Some(m) => materials_null(&materials, m),
+                };
+            if null && interior.is_none() {
+                // It changes nothing: leave it out of the hierarchy.
+                continue;
+            }
+            surfaces.push(Surface {
+                material,
+                light,
+                interior,
+                null,
+            });
+            shapes.push(shape);
+        }
+        for light in &scene.lights {
+            match light {
+                describe::Light::Rectangle {
+                    corner,
+                    edge_u,
+                    edge_v,
+                    radiance,
+                    two_sided,
+                } => {
+                    if radiance.iter().all(|v| *v == 0.0) {
+                        continue;
+                    }
+                    let wide = Wide::Quad([*corner, *edge_u, *edge_v].map(DVec3::from));
+                    let Shape::Quad(quad) = wide.narrow(centre) else {
+                        continue;
+                    };
+                    let index = shapes.len() as u32;
+                    lights.push(Light::Area(Area::quad(
+                        index,
+                        quad,
+                        spectrum(*radiance),
+                        *two_sided,
+                    )));
+                    surfaces.push(Surface {
+                        material: None,
+                        light: Some(lights.len() as u32 - 1),
+                        interior: None,
+                        null: false,
+                    });
+                    shapes.push(Shape::Quad(quad));
+                }
+                other => lights.extend(distant_light(scene, other, centre)?),
+            }
+        }
+        // Area lights without area never shine.
+        let accel = Accel::build(Geometry { shapes })
+            .map_err(|e| Error::Input(format!("{}: {e}", scene.source.file.display())))?;
+        let geometry_seconds = geometry_start.elapsed().as_secs_f64();
+
+        let mut bounds = Aabb::EMPTY;
+        for m in media.iter().filter(|m| m.free) {
+            bounds = bounds.union(m.medium.info.bounds);
+        }
+        if let Some(accel) = &accel {
+            bounds = shapes_bounds(accel.geometry(), bounds);
+        }
+        let radius = (0.5 * bounds.extent().length()).max(f32::MIN_POSITIVE);
+        let lights = Lights::new(lights, radius, lanes);
+
+        let camera_pose = to_local.after(&camera_to_world);
+        let c = &scene.camera;
+        let camera = Camera::new(
+            &camera_pose,
+            c.fov_x_deg,
+            scene.film.resolution,
+            c.lens_radius,
+            c.focus_distance,
+        );
+        let has_null_surfaces = surfaces.iter().any(|s| s.null);
+        let traits = traits(&media, accel.is_some(), &lights, lanes);
+        let dark = lights.all.is_empty() && traits & scene_traits::EMISSIVE_MEDIA == 0;
+        if dark {
+            warn("the scene has no light: the picture will be black");
+        }
+        let mut built = Self {
+            accel,
+            surfaces,
+            has_null_surfaces,
+            materials,
+            media,
+            lights,
+            camera,
+            traits,
+            lanes,
+            centre,
+            preparation: Preparation {
+                media_seconds,
+                geometry_seconds,
+                total_seconds: 0.0,
+            },
+        };
+        built.camera.inside = built.interiors_at(built.camera.origin());
+        built.preparation.total_seconds = start.elapsed().as_secs_f64();
+        Ok(built)
+    }
+
+    /// How many primitives can be hit, 0 without a hierarchy.
+    pub fn accel(&self) -> Option<&Accel> {
+        self.accel.as_ref()
+    }
+
+    /// How many lights there are.
+    pub fn light_count(&self) -> usize {
+        self.lights.all.len()
+    }
+}
+
+/// Index of the material `name`, made on first use.
+fn material(
+    name: &str,
+    scene: &describe::Scene,
+    registry: &Registry,
+    lanes: u32,
+    materials: &mut Vec<Material>,
+) -> Result<u32> {
+    if let Some(i) = materials.iter().position(|m| m.name == name) {
+        return Ok(i as u32);
+    }
+    let block = scene
+        .materials
+        .get(name)
+        .ok_or_else(|| Error::Input(format!("there is no material '{name}' in the scene")))?;
+    let instance =
+        registry.instantiate(PluginKind::Bsdf, block, scene, &Affine::IDENTITY, lanes)?;
+    let bsdf = ForeignBsdf::new(Arc::new(instance))?;
+    materials.push(Material {
+        name: name.to_owned(),
+        bsdf,
+    });
+    Ok(materials.len() as u32 - 1)
+}
+
+fn materials_null(materials: &[Material], m: u32) -> bool {
+    materials[m as usize].bsdf.is_null()
+}
+
+fn spectrum(rgb: [f64; 3]) -> Spectrum {
+    Spectrum::rgb(rgb[0] as f32, rgb[1] as f32, rgb[2] as f32)
+}
+
+/// The middle of what stands at a finite place: relative to it, coordinates keep their digits.
+fn centre(scene: &describe::Scene, shapes: &[Wide], camera: DVec3) -> DVec3 {
+    let mut boxes: Vec<(DVec3, DVec3)> = shapes.iter().filter_map(Wide::bounds).collect();
+    for m in scene.media.values() {
+        // A medium's own bounds are known only once it is made; its place is what keeps far-away scenes precise.
+        let t = affine(&m.transform).translation;
+        if t != DVec3::ZERO {
+            boxes.push((t, t));
+        }
+    }
+    let (lo, hi) = boxes
+        .into_iter()
+        .reduce(|(a, b), (c, d)| (a.min(c), b.max(d)))
+        .unwrap_or((camera, camera));
+    let middle = 0.5 * (lo + hi);
+    if middle.is_finite() {
+        middle
+    } else {
+        DVec3::ZERO
+    }
+}
+
+fn area(shape: &Shape, index: u32, radiance: Spectrum) -> Area {
+    match shape {
+        Shape::Quad(q) => Area::quad(index, *q, radiance, false),
+        Shape::Sphere(s) => Area::sphere(index, *s, radiance),
+        Shape::Mesh(m) => Area::mesh(index, m.clone(), radiance),
+    }
+}
+
+fn shapes_bounds(geometry: &Geometry, mut bounds: Aabb) -> Aabb {
+    for shape in &geometry.shapes {
+        match shape {
+            Shape::Sphere(s) => {
+                let r = Vec3::splat(s.radius);
+                bounds = bounds.including(s.center - r).including(s.center + r);
+            }
+            Shape::Quad(q) => {
+                for (a, b) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+                    bounds = bounds.including(q.corner + q.edge_u * a + q.edge_v * b);
+                }
+            }
+            Shape::Mesh(m) => {
+                for p in &m.positions {
+                    bounds = bounds.including(*p);
+                }
+            }
+        }
+    }
+    bounds
+}
+
+/// Lights that are no surfaces; black ones are left out.
+fn distant_light(
+    scene: &describe::Scene,
+    light: &describe::Light,
+    centre: DVec3,
+) -> Result<Option<Light>> {
+    let black = |rgb: &[f64; 3]| rgb.iter().all(|v| *v == 0.0);
+    Ok(match light {
+        describe::Light::Environment(describe::Environment::Constant { radiance }) => {
+            (!black(radiance)).then(|| Light::Constant {
+                radiance: spectrum(*radiance),
+            })
+        }
+        describe::Light::Environment(describe::Environment::Image {
+            file,
+            scale,
+            rotation,
+        }) => {
+            let path = scene.resolve(file);
+            let (width, height, mut texels) = crate::texture::read_rgb(&path)?;
+            for t in &mut texels {
+                for (v, s) in t.iter_mut().zip(scale) {
+                    *v *= *s as f32;
+                }
+                if t.iter().any(|v| !v.is_finite() || *v < 0.0) {
+                    return Err(Error::Input(format!(
+                        "{}: has a pixel that is negative or not finite, which no light can be",
+                        path.display()
+                    )));
+                }
+            }
+            let r = affine(rotation).to_rows();
+            let rows = [0, 1, 2].map(|i| DVec3::new(r[i][0], r[i][1], r[i][2]).as_vec3());
+            Some(Light::Image(Box::new(ImageEnvironment::new(
+                width, height, texels, rows,
+            ))))
+        }
+        describe::Light::Distant {
+            to_light,
+            irradiance,
+            angle_deg,
+        } => {
+            let to_light = DVec3::from(*to_light).normalize().as_vec3();
+            let irradiance_rgb = spectrum(*irradiance);
+            (!black(irradiance)).then(|| {
+                if *angle_deg > 0.0 {
+                    Light::disc(to_light, irradiance_rgb, *angle_deg)
+                } else {
+                    Light::Distant {
+                        to_light,
+                        irradiance: irradiance_rgb,
+                    }
+                }
+            })
+        }
+        describe::Light::Point {
+            position,
+            intensity,
+        } => (!black(intensity)).then(|| Light::Point {
+            position: (DVec3::from(*position) - centre).as_vec3(),
+            intensity: spectrum(*intensity),
+        }),
+        describe::Light::Rectangle { .. } => None,
+    })
+}
+
+/// The facts that choose the kernels.
+fn traits(media: &[PlacedMedium], surfaces: bool, lights: &Lights, lanes: u32) -> u32 {
+    let mut t = 0;
+    let mut set = |on: bool, bit: u32| t |= if on { bit } else { 0 };
+    set(surfaces, scene_traits::SURFACES);
+    set(!media.is_empty(), scene_traits::MEDIA);
+    let chromatic = |m: &PlacedMedium| {
+        m.medium.info.traits & medium_traits::GREY == 0 && !m.medium.info.sigma_max.is_grey(lanes)
+    };
+    set(media.iter().any(chromatic), scene_traits::CHROMATIC_MEDIA);
+    let emissive = |m: &PlacedMedium| m.medium.info.traits & medium_traits::EMISSIVE != 0;
+    set(media.iter().any(emissive), scene_traits::EMISSIVE_MEDIA);
+    let surface_lights = surfaces && !lights.chooser(false).is_empty();
+    let medium_lights = !media.is_empty() && !lights.chooser(true).is_empty();
+    set(surface_lights || medium_lights, scene_traits::LIGHTS);
+    set(
+        lights.all.iter().any(Light::is_hittable),
+        scene_traits::HITTABLE_LIGHTS,
+    );
+    set(lights.has_environment(), scene_traits::ENVIRONMENT);
+    t
+}

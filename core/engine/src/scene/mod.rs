@@ -1,0 +1,42 @@
+//! The scene: built once from its description, planned once, then only read.
+
+mod build;
+mod media;
+mod shapes;
+mod transport;
+mod view;
+
+pub use build::{Preparation, Scene};
+pub use view::{Counters, View};
+
+use crate::plugin::{ForeignBsdf, ForeignMedium};
+
+/// What stands behind a shape.
+pub struct Surface {
+    /// Index of its material; none absorbs everything.
+    pub material: Option<u32>,
+    /// Index of the light it is, if it emits.
+    pub light: Option<u32>,
+    /// Index of the medium inside.
+    pub interior: Option<u32>,
+    /// Light passes as if it were not there.
+    pub null: bool,
+}
+
+/// A material of the scene.
+pub struct Material {
+    /// Its name there.
+    pub name: String,
+    /// Its BSDF.
+    pub bsdf: ForeignBsdf,
+}
+
+/// A medium of the scene.
+pub struct PlacedMedium {
+    /// Its name there.
+    pub name: String,
+    /// The medium.
+    pub medium: ForeignMedium,
+    /// Stands free, bounded by itself; otherwise it fills shapes.
+    pub free: bool,
+}

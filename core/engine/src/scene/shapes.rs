@@ -1,0 +1,142 @@
+//! From described shapes to geometry, relative to the scene's centre.
+
+use crate::error::{Error, Result};
+use crate::geometry::{Quad, Shape, Sphere, TriangleMesh};
+use glam::{DVec3, Vec2, Vec3};
+use resolvent_api::Affine;
+use resolvent_scene::{Geometry, Scene, Transform};
+
+/// A scene transform as an affine one.
+pub(super) fn affine(t: &Transform) -> Affine {
+    let m = t.0;
+    Affine::from_rows([m[0], m[1], m[2]])
+}
+
+/// A shape in world coordinates, still in double precision.
+pub(super) enum Wide {
+    Sphere(DVec3, f64),
+    Quad([DVec3; 3]),
+    Mesh {
+        positions: Vec<DVec3>,
+        normals: Vec<Vec3>,
+        uvs: Vec<Vec2>,
+        indices: Vec<[u32; 3]>,
+    },
+}
+
+impl Wide {
+    pub fn read(scene: &Scene, geometry: &Geometry) -> Result<Self> {
+        Ok(match geometry {
+            Geometry::Sphere { center, radius } => Self::Sphere(DVec3::from(*center), *radius),
+            Geometry::Rectangle {
+                corner,
+                edge_u,
+                edge_v,
+            } => Self::Quad([*corner, *edge_u, *edge_v].map(DVec3::from)),
+            Geometry::Mesh(m) => Self::mesh(
+                &affine(&m.transform),
+                m.positions.iter().map(|p| DVec3::from(*p)),
+                m.normals.iter().map(|n| DVec3::from(*n)),
+                m.uvs
+                    .iter()
+                    .map(|uv| Vec2::new(uv[0] as f32, uv[1] as f32))
+                    .collect(),
+                m.indices.clone(),
+            ),
+            Geometry::Ply { file, transform } => {
+                let m = resolvent_ply::read(scene.resolve(file))
+                    .map_err(|e| Error::Input(e.to_string()))?;
+                let wide = |v: &[f32; 3]| Vec3::from(*v).as_dvec3();
+                Self::mesh(
+                    &affine(transform),
+                    m.positions.iter().map(wide),
+                    m.normals.as_deref().unwrap_or_default().iter().map(wide),
+                    m.uvs
+                        .as_deref()
+                        .unwrap_or_default()
+                        .iter()
+                        .map(|uv| Vec2::from(*uv))
+                        .collect(),
+                    m.indices,
+                )
+            }
+        })
+    }
+
+    fn mesh(
+        to_world: &Affine,
+        positions: impl Iterator<Item = DVec3>,
+        normals: impl Iterator<Item = DVec3>,
+        uvs: Vec<Vec2>,
+        mut indices: Vec<[u32; 3]>,
+    ) -> Self {
+        // Normals go with the cofactor matrix; a mirroring transform flips the winding, so that the outside stays outside.
+        let [a, b, c] = to_world.columns;
+        let flip = if to_world.determinant() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        let cofactor = [b.cross(c), c.cross(a), a.cross(b)];
+        let normals = normals
+            .map(|n| flip * (cofactor[0] * n.x + cofactor[1] * n.y + cofactor[2] * n.z))
+            .map(|n| n.normalize_or_zero().as_vec3())
+            .collect();
+        if flip < 0.0 {
+            for t in &mut indices {
+                t.swap(1, 2);
+            }
+        }
+        Self::Mesh {
+            positions: positions.map(|p| to_world.point(p)).collect(),
+            normals,
+            uvs,
+            indices,
+        }
+    }
+
+    /// Corners of a box around it.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let around = |points: &mut dyn Iterator<Item = DVec3>| {
+            points
+                .filter(|p| p.is_finite())
+                .fold(None, |b: Option<(DVec3, DVec3)>, p| {
+                    Some(b.map_or((p, p), |(lo, hi)| (lo.min(p), hi.max(p))))
+                })
+        };
+        match self {
+            Self::Sphere(c, r) => around(&mut [*c - *r, *c + *r].into_iter()),
+            Self::Quad([o, u, v]) => around(&mut [*o, *o + *u, *o + *v, *o + *u + *v].into_iter()),
+            Self::Mesh { positions, .. } => around(&mut positions.iter().copied()),
+        }
+    }
+
+    /// Rounded to `f32` relative to `centre`.
+    pub fn narrow(self, centre: DVec3) -> Shape {
+        match self {
+            Self::Sphere(c, r) => Shape::Sphere(Sphere {
+                center: (c - centre).as_vec3(),
+                radius: r as f32,
+            }),
+            Self::Quad([o, u, v]) => Shape::Quad(Quad {
+                corner: (o - centre).as_vec3(),
+                edge_u: u.as_vec3(),
+                edge_v: v.as_vec3(),
+            }),
+            Self::Mesh {
+                positions,
+                normals,
+                uvs,
+                indices,
+            } => Shape::Mesh(TriangleMesh {
+                positions: positions
+                    .into_iter()
+                    .map(|p| (p - centre).as_vec3())
+                    .collect(),
+                normals,
+                uvs,
+                indices,
+            }),
+        }
+    }
+}
