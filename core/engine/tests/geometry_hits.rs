@@ -183,7 +183,7 @@ fn kernels_agree_to_the_bit() {
             "{ray:?}"
         );
         assert_eq!(accel.occluded(&ray), portable.occluded(&ray), "{ray:?}");
-        let even = |h: &Hit| h.prim % 2 == 0;
+        let even = |h: &Hit| h.prim.is_multiple_of(2);
         assert_eq!(
             bits(accel.closest_with(&ray, even)),
             bits(portable.closest_with(&ray, even)),
