@@ -48,6 +48,7 @@ mod error;
 mod format;
 mod json;
 mod nearest;
+mod parse;
 mod plugin;
 mod read;
 mod schema;
