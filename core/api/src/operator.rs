@@ -162,9 +162,6 @@ pub mod flight_flags {
     /// No other medium reaches into the segment, so the flight won't be cut short by another's collision:
     /// [`super::Flight::emitted`] may be its expectation over the whole segment.
     pub const ALONE: u32 = 2;
-    /// Media that tell lanes apart overlap on the segment. [`super::Flight::emitted`] then holds the hero lane alone, times lanes
-    /// over the hero's prior: the usual weights over lanes would lack the other media's transmittance.
-    pub const MIXED: u32 = 4;
 }
 
 /// How a flight ended.

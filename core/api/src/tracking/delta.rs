@@ -124,22 +124,10 @@ fn lane_weight<F: Field>(
     dt: f32,
     u: &FlightDraws,
 ) -> Spectrum {
-    if u.flags & flight_flags::MIXED != 0 {
-        return hero_weight(u);
-    }
     if !F::Lanes::CHROMATIC {
         return Spectrum::splat(1.0 / u.prior.mean(u.lanes));
     }
     let log = log_value - (majorant - F::Lanes::splat(hero)) * dt;
     let reached = (value * (log - F::Lanes::splat(log.max_lane())).exp()).spectrum();
     reached / (reached * u.prior).mean(u.lanes)
-}
-
-/// Weight under [`flight_flags::MIXED`]: the hero lane alone, over the density with which it was chosen and came here.
-#[inline(always)]
-pub fn hero_weight(u: &FlightDraws) -> Spectrum {
-    let mut weight = Spectrum::ZERO;
-    let hero = u.hero as usize & 3;
-    weight[hero] = u.lanes as f32 / u.prior[hero];
-    weight
 }

@@ -1,4 +1,4 @@
-//! Tracking: free flight and transmittance over a [`Field`], compiled once per field inside its plugin.
+//! Tracking: free flight and transmittance over a [`crate::Field`], compiled once per field inside its plugin.
 //!
 //! Null points on a ray form a Poisson process of the rate of the majorant. [`delta`] samples the next collision,
 //! [`ratio`] estimates a transmittance. Both use a minorant where the field knows one: a collision below the minorant is

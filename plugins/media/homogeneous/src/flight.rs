@@ -7,7 +7,6 @@
 use crate::Homogeneous;
 use resolvent_api::operator::flight_flags;
 use resolvent_api::rng::{Stream, derive, exponential_fine};
-use resolvent_api::tracking::delta::hero_weight;
 use resolvent_api::{Event, Flight, FlightDraws, Segment, Spectrum};
 
 /// The part of a segment that lies in the medium.
@@ -129,9 +128,6 @@ impl Homogeneous {
                 };
                 amount(j, path / before)
             });
-        }
-        if u.flags & flight_flags::MIXED != 0 {
-            return j.zip(hero_weight(u), |j, w| amount(j * w, length));
         }
         if self.grey {
             return j.map(|j| amount(j, length / before));
