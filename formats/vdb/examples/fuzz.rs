@@ -7,9 +7,11 @@
 //! ```
 //! A mutant that misbehaves is written to the folder (the current one if none is given).
 
-#[path = "../tests/hostile/mod.rs"]
+#[path = "../tests/suite/hostile.rs"]
 mod hostile;
-#[path = "../tests/mutate/mod.rs"]
+#[path = "../tests/suite/memory.rs"]
+mod memory;
+#[path = "../tests/suite/mutate.rs"]
 mod mutate;
 
 use std::path::PathBuf;
@@ -17,7 +19,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use hostile::{Outcome, allowance, memory, read_everything};
+use hostile::{Outcome, allowance, read_everything};
 use mutate::{Random, mutate, seeds};
 
 #[global_allocator]

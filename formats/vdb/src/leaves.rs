@@ -18,7 +18,7 @@ use crate::source::Source;
 use crate::topology::{LeafNode, Topology};
 
 /// Bytes of the file held at once (twice: one window is read while another is decoded).
-const WINDOW: u64 = 8 << 20;
+const WINDOW: u64 = 4 << 20;
 /// Leaves per task: 128 kB of floats, some 50 µs of work.
 const BLOCK: usize = 64;
 

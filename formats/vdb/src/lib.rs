@@ -72,9 +72,11 @@
 #![forbid(unsafe_code)]
 
 mod blosc;
+mod descriptor;
 mod encoding;
 mod error;
 mod file;
+mod grid;
 mod header;
 mod leaf_record;
 mod leaf_values;
@@ -89,10 +91,12 @@ mod topology;
 mod transform;
 mod tree;
 mod value;
+mod walk;
 
 pub use encoding::{Codec, Compression};
 pub use error::{Error, ErrorKind, Result};
-pub use file::{File, GridClass, GridInfo};
+pub use file::File;
+pub use grid::{GridClass, GridInfo};
 pub use leaf_values::{Halves, LEAF_VOXELS, LeafValues};
 pub use metadata::{MetaEntry, MetaValue, Metadata};
 pub use parallel::{Parallel, Serial};

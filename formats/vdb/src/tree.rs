@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 
 use crate::error::Result;
-use crate::file::{File, GridInfo};
+use crate::file::File;
+use crate::grid::GridInfo;
 use crate::leaf_values::{Halves, LEAF_VOXELS, LeafValues};
 use crate::parallel::Parallel;
 use crate::tiles::Level;

@@ -1,11 +1,9 @@
 //! Every file of the corpus, against what the OpenVDB library reads in it.
 
-mod sidecar;
-
 use std::time::{Duration, Instant};
 
+use crate::sidecar::{Checked, Rayon, check_file, data, json};
 use resolvent_vdb::{Error, File, Parallel, Serial, Tree};
-use sidecar::{Checked, Rayon, check_file, data, json};
 
 /// Reads all there is and returns the errors met.
 fn read_all(bytes: &std::path::Path, parallel: &dyn Parallel) -> Vec<Error> {

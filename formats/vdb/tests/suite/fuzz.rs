@@ -1,15 +1,10 @@
 //! A short run of the fuzzer (the long one is `examples/fuzz.rs`), and files made to cost much.
 
-mod hostile;
-mod mutate;
-
 use std::time::{Duration, Instant};
 
-use hostile::{Outcome, allowance, memory, read_everything};
-use mutate::{Random, mutate, seeds};
-
-#[global_allocator]
-static ALLOCATOR: memory::Counting = memory::Counting;
+use crate::hostile::{Outcome, allowance, read_everything};
+use crate::memory;
+use crate::mutate::{Random, mutate, seeds};
 
 #[test]
 fn mutants_end_well() {

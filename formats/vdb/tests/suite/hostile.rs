@@ -1,9 +1,8 @@
 //! Reading damaged files, and what that may cost.
 
-pub mod memory;
-
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::memory;
 use resolvent_vdb::{File, Halves, Serial, Tree};
 
 /// What became of one input.
@@ -92,6 +91,7 @@ fn read_grid(file: &File, grid: &resolvent_vdb::GridInfo) -> resolvent_vdb::Resu
         );
     }
     tree.sample([f64::NAN, 1e300, -1e300]);
+    file.statistics(grid, &Serial)?;
     file.read_leaves(grid, topology, Halves::Keep, &Serial, |_, _| {})?;
     Ok(())
 }

@@ -1,14 +1,9 @@
 //! Files made by hand for what the corpus leaves out: refusals, bombs, odd values.
 
-mod hostile;
-mod writer;
-
-use hostile::{Outcome, memory, read_everything};
+use crate::hostile::{Outcome, read_everything};
+use crate::memory;
+use crate::writer::{Writer, coordinate, doubles, leaves, masks, root, text, zipped};
 use resolvent_vdb::{Error, ErrorKind, File, GridClass, Halves, LeafValues, Serial, Tree, Value};
-use writer::{Writer, coordinate, doubles, leaves, masks, root, text, zipped};
-
-#[global_allocator]
-static ALLOCATOR: memory::Counting = memory::Counting;
 
 fn open(writer: &Writer) -> File {
     File::from_bytes("made.vdb", writer.file()).unwrap()
