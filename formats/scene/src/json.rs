@@ -5,7 +5,8 @@ use crate::parse::parse;
 
 /// The largest text that is read, in bytes. Larger meshes belong into PLY files.
 ///
-/// A list of one-digit numbers takes 32 bytes in memory per two bytes of text: this bounds it to 1 GiB.
+/// A list of one-digit numbers takes 32 bytes in memory per two bytes of text: at most 1.4 GiB at the
+/// peak (measured), while the list grows.
 pub(crate) const MAX_BYTES: u64 = 64 << 20;
 
 /// Longer paths are shown by their beginning and end: a place is kept for every parameter of a plugin,
