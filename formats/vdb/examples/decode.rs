@@ -3,6 +3,12 @@
 //! ```text
 //! cargo run --release -p resolvent-vdb --example decode -- FILE.vdb [GRID] [--threads N] [--half] [--repeat N]
 //! ```
+//!
+//! Measured on two shared Xeon cores, page cache warm, with a procedural cumulus of 140 M active
+//! voxels in 314,027 leaves (487 MB of Blosc, 643 MB of decoded leaves, 561 MB of them active): 0.64 s
+//! or 880 MB/s of active voxel data while the machine was quiet, 1.4 to 2.1 s with six other jobs
+//! running; 0.67 s of CPU time, half of it page faults and copying from the page cache; 680 MB of
+//! peak resident memory, 1.21 times the active data.
 
 use std::error::Error;
 use std::time::Instant;
