@@ -54,7 +54,8 @@ impl Sampler {
     fn four(&self, bounce: u32, purpose: Purpose) -> [f32; 4] {
         let dimension = (bounce * 8 + purpose as u32) as u64;
         if bounce < NET_BOUNCES {
-            sobol::point(self.index, derive(self.batch_key, 0x2000 + dimension)).map(unit)
+            let [a, b, c, d] = sobol::point(self.index, derive(self.batch_key, 0x2000 + dimension));
+            [unit(a), unit(b), unit(c), unit(d)]
         } else {
             let a = derive(self.sample_key, dimension);
             let b = mix(a.wrapping_add(0x9e37_79b9_7f4a_7c15));

@@ -46,9 +46,12 @@ impl Kernel<'_> {
 
         let mut beta = Throughput::ONE;
         beta.f *= ray.weight;
-        let (mut edge, mut next, mut here) = (Edge::default(), Vertex::empty(), Vertex::empty());
+        let (mut first, mut second) = (Vertex::empty(), Vertex::empty());
+        // Vertices are large: they change roles, not places.
+        let (mut here, mut next) = (&mut first, &mut second);
+        let mut edge = Edge::default();
         let mut found = Found::Alone;
-        let mut alive = scene.emerge(&ray, &sampler.flight(0, beta.p), &mut edge, &mut next)?;
+        let mut alive = scene.emerge(&ray, &sampler.flight(0, beta.p), &mut edge, next)?;
         let connects = scene.has(scene_traits::LIGHTS);
         let emissive = scene.has(scene_traits::EMISSIVE_MEDIA);
 
@@ -62,7 +65,7 @@ impl Kernel<'_> {
             let medium = next.is(VertexKind::Medium);
             if !medium && next.flags & vertex_flags::EMITS != 0 && self.keeps(depth) {
                 let other = match found {
-                    Found::With(density) if connects => scene.light_density(&here, &next) / density,
+                    Found::With(density) if connects => scene.light_density(here, next) / density,
                     _ => 0.0,
                 };
                 out.radiance += beta.found::<CHROMATIC>(&edge, other, lanes) * next.emitted;
@@ -73,7 +76,7 @@ impl Kernel<'_> {
             if depth == 0 {
                 out.alpha = 1.0;
                 if features {
-                    describe(&mut out, &next, edge.length);
+                    describe(&mut out, next, edge.length);
                 }
             }
             beta.travel::<CHROMATIC>(&edge);
@@ -88,11 +91,11 @@ impl Kernel<'_> {
                 }
             }
             if connects && self.keeps(depth + 1) {
-                out.radiance += self.connect::<CHROMATIC>(&here, &beta, sampler, depth)?;
+                out.radiance += self.connect::<CHROMATIC>(here, &beta, sampler, depth)?;
             }
 
             let (draws, chance) = sampler.scatter(depth);
-            let Some(s) = scatter::sample(scene, &here, draws, Mode::Radiance)? else {
+            let Some(s) = scatter::sample(scene, here, draws, Mode::Radiance)? else {
                 break;
             };
             beta.f *= s.weight;
@@ -109,7 +112,7 @@ impl Kernel<'_> {
                 Found::With(s.forward)
             };
             let flight = sampler.flight(depth + 1, beta.p);
-            alive = scene.propagate(&here, Vec3::from(s.wi), &flight, &mut edge, &mut next)?;
+            alive = scene.propagate(here, Vec3::from(s.wi), &flight, &mut edge, next)?;
         }
         Ok(out)
     }
