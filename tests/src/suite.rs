@@ -3,6 +3,9 @@
 use crate::moments::Moments;
 use crate::ztest::{sidak, z_test};
 
+/// Findings shown of those that fail.
+const SHOWN: usize = 12;
+
 /// Findings of one test: p-values, and claims that hold or don't.
 ///
 /// All p-values are judged at one family-wise level with Šidák's correction, so adding checks doesn't make a correct plugin
@@ -78,7 +81,7 @@ impl Suite {
             "{} of {} findings fail:\n{}",
             rejected.len(),
             self.tests.len() + self.claims,
-            rejected.join("\n")
+            rejected[..rejected.len().min(SHOWN)].join("\n")
         );
     }
 }
