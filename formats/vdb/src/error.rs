@@ -17,6 +17,8 @@ pub enum ErrorKind {
     Unsupported,
     /// The file breaks the format: cut short, damaged, or not an OpenVDB file.
     Invalid,
+    /// The caller's [`Parallel`](crate::Parallel) left tasks undone, as it may to give up.
+    Cancelled,
     /// The file is fine, but what was asked for is not in it.
     Missing,
 }

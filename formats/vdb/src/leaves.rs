@@ -7,10 +7,10 @@
 
 use std::mem;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use crate::encoding::{Encoding, Scratch};
-use crate::error::{Fault, Parsed};
+use crate::error::{ErrorKind, Fault, Parsed};
 use crate::leaf_record;
 use crate::leaf_values::{Halves, LeafValues};
 use crate::parallel::Parallel;
@@ -79,6 +79,7 @@ impl Job<'_> {
                 .collect();
             let left = leaves.len() - done - count;
             let next = Mutex::new(mem::take(&mut spare));
+            let finished = AtomicUsize::new(0);
             parallel.run(blocks.len() + 1, &|task| {
                 if failed.load(Ordering::Relaxed) {
                     return;
@@ -89,6 +90,7 @@ impl Job<'_> {
                     {
                         fail(done + count, new);
                     }
+                    finished.fetch_add(1, Ordering::Relaxed);
                     return;
                 }
                 let Some(places) = lock(&blocks[task - 1]).take() else {
@@ -108,9 +110,14 @@ impl Job<'_> {
                     }
                 }
                 lock(&scratch).push(memory);
+                finished.fetch_add(1, Ordering::Relaxed);
             });
             if let Some((_, fault)) = lock(&fault).take() {
                 return Err(fault);
+            }
+            if finished.into_inner() < blocks.len() + 1 {
+                let reason = "reading was given up: the caller's threads left tasks undone";
+                return Err(Fault::new(ErrorKind::Cancelled, None, reason));
             }
             done += count;
             spare = mem::replace(

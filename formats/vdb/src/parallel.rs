@@ -5,7 +5,8 @@
 /// With rayon: `(0..count).into_par_iter().for_each(|i| task(i))`.
 pub trait Parallel: Sync {
     /// Calls `task(i)` exactly once for each `i` in `0..count`, in any order, on any threads, and
-    /// returns when all calls have returned.
+    /// returns when all calls have returned. It may leave calls out to give up: reading then ends
+    /// with [`ErrorKind::Cancelled`](crate::ErrorKind::Cancelled).
     fn run(&self, count: usize, task: &(dyn Fn(usize) + Sync));
 }
 

@@ -1,10 +1,11 @@
 //! Grids larger than the reader's windows: order, errors behind the first window, memory.
 
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::writer::{Writer, leaves};
 use crate::{memory, sidecar};
-use resolvent_vdb::{File, GridInfo, Halves, LeafValues, Parallel, Serial, Topology};
+use resolvent_vdb::{ErrorKind, File, GridInfo, Halves, LeafValues, Parallel, Serial, Topology};
 
 const LEAVES: usize = 4096;
 
@@ -97,6 +98,32 @@ fn an_error_in_a_later_window_is_found_and_the_first_is_told() {
     assert_eq!(error.offset, Some(first as u64 + 64));
     let highest = *highest.lock().unwrap();
     assert!((1000..3000).contains(&highest), "{highest}");
+}
+
+/// Stops after some tasks.
+struct Quitter(AtomicUsize);
+
+impl Parallel for Quitter {
+    fn run(&self, count: usize, task: &(dyn Fn(usize) + Sync)) {
+        for index in 0..count {
+            if self.0.fetch_add(1, Ordering::Relaxed) == 20 {
+                return;
+            }
+            task(index);
+        }
+    }
+}
+
+#[test]
+fn tasks_left_undone_are_told() {
+    let file = File::from_bytes("large.vdb", file()).unwrap();
+    let grid = &file.grids()[0];
+    let topology = file.read_topology(grid).unwrap();
+    let quitter = Quitter(AtomicUsize::new(0));
+    let error = file
+        .read_leaves(grid, &topology, Halves::Widen, &quitter, |_, _| {})
+        .unwrap_err();
+    assert_eq!(error.kind, ErrorKind::Cancelled);
 }
 
 /// Decoding into one's own storage takes little more than that storage.
