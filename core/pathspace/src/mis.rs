@@ -58,7 +58,8 @@ impl Throughput {
             self.p *= sigma_t;
             self.normalise(lanes);
         } else {
-            self.f *= sigma_s * (1.0 / sigma_t[0]);
+            // Divided, not multiplied by the inverse: at albedo 1 the quotient is exactly 1, however often it is taken.
+            self.f *= sigma_s / sigma_t[0];
         }
     }
 
@@ -81,8 +82,11 @@ impl Throughput {
             let density = self.p * (edge.track + edge.ratio * other);
             self.f * edge.value / density.mean(lanes)
         } else {
-            let (value, ratio) = (edge.value[0], edge.ratio[0]);
+            if other == 0.0 {
+                return self.f;
+            }
             // value = track; a huge ratio (a path connection would find far more often) gives weight 0, not NaN.
+            let (value, ratio) = (edge.value[0], edge.ratio[0]);
             self.f * (value / (value + other * ratio))
         }
     }

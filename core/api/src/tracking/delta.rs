@@ -1,6 +1,6 @@
 //! Free flight by delta tracking (Woodcock et al. 1965) with local majorants, minorants and lane densities.
 
-use super::{Draws, STALLS, finish, rescale};
+use super::{Draws, STALLS, finish, fold, rescale};
 use crate::medium::Field;
 use crate::operator::{Event, Flight, FlightDraws, Segment, flight_flags};
 use crate::rng::exponential;
@@ -89,6 +89,10 @@ pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &Flig
                     }
                     if RATIO {
                         ratio = ratio * ((majorant - minorant) / F::Lanes::splat(null));
+                    }
+                    if F::Lanes::CHROMATIC {
+                        fold(&mut value, &mut log_value);
+                        fold(&mut ratio, &mut log_ratio);
                     }
                     if F::Lanes::CHROMATIC || RATIO {
                         rescale(&mut value, &mut ratio);

@@ -52,6 +52,17 @@ pub(crate) fn rescale<L: crate::Lanes>(a: &mut L, b: &mut L) {
     }
 }
 
+/// Multiplies an exponential into its product once it has grown: a lane's product over null collisions and its
+/// exponential run away in opposite directions, and only together they stay within range.
+#[inline(always)]
+pub(crate) fn fold<L: crate::Lanes>(product: &mut L, log: &mut L) {
+    let zero = L::splat(0.0);
+    if log.max_lane().max((zero - *log).max_lane()) > 8.0 {
+        *product = *product * log.exp();
+        *log = zero;
+    }
+}
+
 /// `a·exp(log_a)` and `b·exp(log_b)` up to a common factor that keeps the larger exponent at zero.
 #[inline(always)]
 pub(crate) fn finish<L: crate::Lanes>(

@@ -1,6 +1,6 @@
 //! Transmittance of a connection: residual ratio tracking, and survival of a free flight.
 
-use super::{Draws, STALLS, finish, rescale};
+use super::{Draws, STALLS, finish, fold, rescale};
 use crate::medium::Field;
 use crate::operator::{Flight, FlightDraws, Segment};
 use crate::rng::exponential;
@@ -70,6 +70,8 @@ pub fn transmit<F: Field>(field: &F, s: &Segment, u: &FlightDraws) -> Flight {
             value = value * ((cell.majorant - sigma) / F::Lanes::splat(hero));
             if F::Lanes::CHROMATIC {
                 ratio = ratio * (residual / F::Lanes::splat(hero));
+                fold(&mut value, &mut log_value);
+                fold(&mut ratio, &mut log_ratio);
                 rescale(&mut value, &mut ratio);
             }
             if !(value.max_lane() > 0.0) {
