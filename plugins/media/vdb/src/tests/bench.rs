@@ -1,0 +1,117 @@
+//! Timings, printed when `RESOLVENT_BENCH` is set:
+//! `RESOLVENT_BENCH=1 cargo test --release -p resolvent-medium-vdb bench -- --nocapture`.
+
+use super::{data, draws, medium};
+use crate::settings::{Choice, Settings};
+use resolvent_api::math::{Vec3, warp};
+use resolvent_api::rng::Stream;
+use resolvent_api::{FlightDraws, Medium, Segment, Spectrum};
+
+/// Flights that start where light scatters: at collisions of earlier flights, in all directions.
+pub fn inner_segments(medium: &dyn Medium, count: usize) -> Vec<Segment> {
+    let bounds = medium.info().bounds;
+    let mut stream = Stream::new(7);
+    let mut out = Vec::new();
+    while out.len() < count {
+        let target = Vec3::from(bounds.min)
+            + bounds.extent() * Vec3::new(stream.uniform(), stream.uniform(), stream.uniform());
+        let mut d = warp::sphere(stream.uniform2());
+        let mut o = target - d * (2.0 * bounds.extent().length());
+        let mut t1 = f32::INFINITY;
+        for _ in 0..200 {
+            let s = Segment {
+                o: o.into(),
+                t0: 0.0,
+                d: d.into(),
+                t1,
+            };
+            let Some((_, far)) = bounds.clip(o, d, 0.0, f32::INFINITY) else {
+                break;
+            };
+            t1 = far;
+            if out.len() < count && t1 < 2.0 * bounds.extent().length() {
+                out.push(s);
+            }
+            let u = draws(&mut stream);
+            let f = medium.sample(&s, &u);
+            if !f.collided() {
+                break;
+            }
+            o = s.at(f.t);
+            d = warp::sphere(stream.uniform2());
+        }
+    }
+    out
+}
+
+/// Time this thread has run: other processes don't count.
+fn cpu_seconds() -> f64 {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text
+        .split_whitespace()
+        .next()
+        .and_then(|n| n.parse::<f64>().ok());
+    nanoseconds.unwrap_or(f64::NAN) * 1e-9
+}
+
+#[test]
+fn bench() {
+    if std::env::var_os("RESOLVENT_BENCH").is_none() {
+        return;
+    }
+    let grey = |v: f32| Spectrum::rgb(v, v, v);
+    let scenes = [
+        ("cloud_s", "cloud_s.vdb", grey(24.56)),
+        (
+            "cloud_rgb",
+            "cloud_s.vdb",
+            Spectrum::rgb(2.72889, 8.18667, 24.56),
+        ),
+        ("smoke", "real/smoke.vdb", grey(1.492)),
+    ];
+    for (name, file, sigma) in scenes {
+        let mut settings = Settings::new(data(file).to_string_lossy(), "density");
+        settings.sigma_t = sigma;
+        for choice in [Choice::Survival, Choice::Ratio] {
+            settings.transmittance = choice;
+            let m = medium(&settings);
+            let segments = inner_segments(&*m, 200_000);
+            let mut stream = Stream::new(1);
+            let all: Vec<_> = segments.iter().map(|_| draws(&mut stream)).collect();
+            let run = |what: &str, f: &dyn Fn(&Segment, &FlightDraws) -> (f32, u32, u32)| {
+                let mut best = f64::MAX;
+                let (mut sum, mut squares, mut lookups, mut ends) = (0.0f64, 0.0f64, 0u64, 0u64);
+                for _ in 0..7 {
+                    (sum, squares, lookups, ends) = (0.0, 0.0, 0, 0);
+                    let start = cpu_seconds();
+                    for (s, u) in segments.iter().zip(&all) {
+                        let (v, l, e) = f(s, u);
+                        sum += f64::from(v);
+                        squares += f64::from(v) * f64::from(v);
+                        lookups += u64::from(l);
+                        ends += u64::from(e);
+                    }
+                    best = best.min(cpu_seconds() - start);
+                }
+                let n = segments.len() as f64;
+                println!(
+                    "{name:10} {choice:?} {what:9} {:7.1} ns, {:.2} look-ups, mean {:.5}, second moment {:.5}, ends {:.3}",
+                    best * 1e9 / n,
+                    lookups as f64 / n,
+                    sum / n,
+                    squares / n,
+                    ends as f64 / n
+                );
+            };
+            run("sample", &|s, u| {
+                let f = m.sample(s, u);
+                (f.t - s.t0, f.lookups, f.event)
+            });
+            run("transmit", &|s, u| {
+                let f = m.transmit(s, u);
+                (f.value[0] / f.ratio[0], f.lookups, f.event)
+            });
+            run("depth", &|s, _| (m.depth(s)[0], 0, 0));
+        }
+    }
+}
