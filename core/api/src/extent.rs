@@ -22,6 +22,8 @@ pub struct Extent {
     /// World to the coordinates in which the box is [−1, 1]³ and the ball has radius 1.
     to_unit: Affine,
     bounds: Aabb,
+    center: DVec3,
+    half: DVec3,
 }
 
 impl Extent {
@@ -53,6 +55,8 @@ impl Extent {
         kind: Kind::All,
         to_unit: Affine::IDENTITY,
         bounds: Aabb::ALL,
+        center: DVec3::ZERO,
+        half: DVec3::INFINITY,
     };
 
     /// The extent that the parameters describe; [`Extent::ALL`] if there is none among them, `None` if it has no volume.
@@ -136,6 +140,8 @@ impl Extent {
             kind,
             to_unit,
             bounds,
+            center: object.translation,
+            half,
         }))
     }
 
@@ -147,6 +153,16 @@ impl Extent {
     /// True if there is no boundary.
     pub fn is_all(&self) -> bool {
         self.kind == Kind::All
+    }
+
+    /// True for spheres and what transforms make of them.
+    pub fn is_ball(&self) -> bool {
+        self.kind == Kind::Ball
+    }
+
+    /// Centre and half the size along each axis, in object space; infinite if there is no boundary.
+    pub fn object_box(&self) -> (DVec3, DVec3) {
+        (self.center, self.half)
     }
 
     /// World to the coordinates in which the extent is [−1, 1]³ or the unit ball.
