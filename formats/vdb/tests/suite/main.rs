@@ -8,6 +8,7 @@ mod memory;
 mod mutate;
 mod sidecar;
 mod windows;
+mod witness;
 mod writer;
 
 #[global_allocator]
