@@ -8,7 +8,7 @@
 //! with the density |cos θ|/π, so the weight of a sample is ρ.
 //!
 //! ```json
-//! "bsdf": { "type": "diffuse", "reflectance": [0.8, 0.6, 0.4] }
+//! "materials": { "clay": { "plugin": "diffuse", "params": { "reflectance": [0.8, 0.6, 0.4] } } }
 //! ```
 
 #[cfg(test)]

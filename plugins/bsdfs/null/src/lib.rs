@@ -7,7 +7,7 @@
 //! lights behind it.
 //!
 //! ```json
-//! "bsdf": { "type": "null" }
+//! "materials": { "boundary": { "plugin": "null" } }
 //! ```
 
 #[cfg(test)]

@@ -20,10 +20,10 @@
 //! Collisions are drawn with 53 bits, so optical depths from 10⁻⁶ to 10⁶ and beyond are sampled without a floor.
 //!
 //! ```json
-//! "media": [{
-//!   "type": "homogeneous", "sigma_t": 4, "albedo": [0.9, 0.95, 0.99],
-//!   "bounds": [-1, 0, -1, 1, 1, 1], "phase": { "type": "hg", "g": 0.6 }
-//! }]
+//! "media": { "haze": { "plugin": "homogeneous", "params": {
+//!   "sigma_t": 4, "albedo": [0.9, 0.95, 0.99], "bounds": [-1, 0, -1, 1, 1, 1],
+//!   "phase": { "plugin": "hg", "params": { "g": 0.6 } }
+//! } } }
 //! ```
 
 mod coefficients;

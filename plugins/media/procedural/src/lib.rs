@@ -29,10 +29,14 @@
 //! Without an extent the fog reaches to the horizon and begins at `height`: there is nothing below.
 //!
 //! ```json
-//! "media": [
-//!   { "type": "procedural", "kind": "cloud", "sigma_t": 20, "radius": 2, "phase": { "type": "hg", "g": 0.85 } },
-//!   { "type": "procedural", "kind": "height_fog", "sigma_t": 0.1, "scale_height": 3, "albedo": 0.95 }
-//! ]
+//! "media": {
+//!   "cloud": { "plugin": "procedural", "params": {
+//!     "sigma_t": 20, "radius": 2, "phase": { "plugin": "hg", "params": { "g": 0.85 } }
+//!   } },
+//!   "fog": { "plugin": "procedural", "params": {
+//!     "kind": "height_fog", "sigma_t": 0.1, "scale_height": 3, "albedo": 0.95
+//!   } }
+//! }
 //! ```
 
 mod cloud;

@@ -9,7 +9,7 @@
 //! scattering event never changes the throughput.
 //!
 //! ```json
-//! "phase": { "type": "hg", "g": 0.85 }
+//! "phase": { "plugin": "hg", "params": { "g": 0.85 } }
 //! ```
 
 #[cfg(test)]

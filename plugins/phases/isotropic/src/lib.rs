@@ -6,7 +6,7 @@
 //! collisions and for tests against the classical tables of radiative transfer, which are made for it.
 //!
 //! ```json
-//! "phase": { "type": "isotropic" }
+//! "phase": { "plugin": "isotropic" }
 //! ```
 
 use resolvent_api::math::warp;

@@ -11,7 +11,7 @@
 //! The lobe is chosen by its weight and the density is that of the mixture, so the throughput stays unchanged.
 //!
 //! ```json
-//! "phase": { "type": "two-lobe-hg", "g1": 0.9, "g2": -0.4, "weight": 0.85 }
+//! "phase": { "plugin": "two-lobe-hg", "params": { "g1": 0.9, "g2": -0.4, "weight": 0.85 } }
 //! ```
 
 #[cfg(test)]
