@@ -15,6 +15,7 @@ use crate::spectrum::Spectrum;
 use crate::surface::{Bsdf, SurfacePoint};
 use core::ffi::c_void;
 use core::marker::PhantomData;
+use core::sync::atomic::{AtomicPtr, Ordering};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// What every plugin declares.
@@ -57,7 +58,15 @@ fn install_hook() {
     });
 }
 
-fn panic_text(payload: &(dyn std::any::Any + Send)) -> String {
+/// A panic in a task of [`Host::parallel_for`], passed on with the words of [`panic_text`].
+pub(crate) struct TaskPanic(pub String);
+
+/// The words for a caught panic. The payload is leaked: a destructor of it could panic again, outside of any guard.
+pub(crate) fn panic_text(payload: Box<dyn std::any::Any + Send>) -> String {
+    let payload = Box::leak(payload);
+    if let Some(task) = payload.downcast_ref::<TaskPanic>() {
+        return format!("{} (in a parallel task)", task.0);
+    }
     let text = payload
         .downcast_ref::<&str>()
         .map(|s| s.to_string())
@@ -73,7 +82,7 @@ fn guarded(host: Host, f: impl FnOnce() -> Status) -> Status {
     match catch_unwind(AssertUnwindSafe(f)) {
         Ok(status) => status,
         Err(payload) => {
-            host.fail(&panic_text(&*payload));
+            host.fail(&panic_text(payload));
             Status::PANIC
         }
     }
@@ -83,6 +92,7 @@ unsafe extern "C" fn create<T: Plugin>(args: *const CreateArgs) -> *mut c_void {
     install_hook();
     // SAFETY: the host passes valid arguments for the duration of the call.
     let args = unsafe { &*args };
+    HOST.store(args.host.cast_mut(), Ordering::Relaxed);
     // SAFETY: as above; the host's table outlives the instance.
     let (params, host) = unsafe { (Params::new(args), Host::new(args.host)) };
     match catch_unwind(AssertUnwindSafe(|| T::create(&params))) {
@@ -92,7 +102,7 @@ unsafe extern "C" fn create<T: Plugin>(args: *const CreateArgs) -> *mut c_void {
             core::ptr::null_mut()
         }
         Err(payload) => {
-            host.fail(&panic_text(&*payload));
+            host.fail(&panic_text(payload));
             core::ptr::null_mut()
         }
     }
@@ -116,7 +126,23 @@ unsafe fn instance<'a, T>(p: *const c_void) -> &'a Instance<T> {
     unsafe { &*p.cast::<Instance<T>>() }
 }
 
-/// The table of a closure type. Closures have no way to the host, so a panic in one is reported by its status alone.
+/// The host's table, for closures: they are plain data and carry no way to the host. A library holds one plugin and is loaded
+/// by one program, so one place is enough.
+static HOST: AtomicPtr<HostTable> = AtomicPtr::new(core::ptr::null_mut());
+
+/// Reports a panic in a closure.
+#[cold]
+fn closure_panicked(payload: Box<dyn std::any::Any + Send>) -> Status {
+    let text = panic_text(payload);
+    let table = HOST.load(Ordering::Relaxed);
+    if !table.is_null() {
+        // SAFETY: the table came with `create` and lives as long as the process.
+        unsafe { Host::new(table) }.fail(&text);
+    }
+    Status::PANIC
+}
+
+/// The table of a closure type.
 pub struct ScatterShim<C>(PhantomData<C>);
 
 impl<C: Scatter + Copy + Send + Sync + 'static> ScatterShim<C> {
@@ -146,7 +172,7 @@ impl<C: Scatter + Copy + Send + Sync + 'static> ScatterShim<C> {
                 unsafe { *out = e };
                 Status::OK
             }
-            Err(_) => Status::PANIC,
+            Err(payload) => closure_panicked(payload),
         }
     }
 
@@ -168,14 +194,17 @@ impl<C: Scatter + Copy + Send + Sync + 'static> ScatterShim<C> {
                 Status::OK
             }
             Ok(None) => Status::NONE,
-            Err(_) => Status::PANIC,
+            Err(payload) => closure_panicked(payload),
         }
     }
 
     unsafe extern "C" fn lobes(data: *const c_void) -> u32 {
         // SAFETY: as above.
         let closure = unsafe { &*data.cast::<C>() };
-        catch_unwind(AssertUnwindSafe(|| closure.lobes())).unwrap_or(0)
+        catch_unwind(AssertUnwindSafe(|| closure.lobes())).unwrap_or_else(|payload| {
+            closure_panicked(payload);
+            0
+        })
     }
 }
 
@@ -310,7 +339,11 @@ impl<T: Plugin + Bsdf> BsdfShim<T> {
     unsafe extern "C" fn traits(p: *const c_void) -> u32 {
         // SAFETY: a live instance, by the ABI.
         let i = unsafe { instance::<T>(p) };
-        catch_unwind(AssertUnwindSafe(|| i.value.traits())).unwrap_or(0)
+        catch_unwind(AssertUnwindSafe(|| i.value.traits())).unwrap_or_else(|payload| {
+            // There is no status here: the host looks for a report after the call.
+            i.host.fail(&panic_text(payload));
+            0
+        })
     }
 
     unsafe extern "C" fn closure(
@@ -396,6 +429,10 @@ macro_rules! export_plugin {
         $crate::export_plugin!(@ $t, Integrator, IntegratorTable, IntegratorShim);
     };
     (@ $t:ty, $kind:ident, $table:ident, $shim:ident) => {
+        #[cfg(panic = "abort")]
+        compile_error!(
+            "a plugin must be built with panic = \"unwind\": a panic would end the whole program instead of the render"
+        );
         /// The exported header.
         #[unsafe(no_mangle)]
         #[allow(non_upper_case_globals)]

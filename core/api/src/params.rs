@@ -283,29 +283,33 @@ impl Host {
     pub fn parallel_for<F: Fn(usize) + Sync>(&self, count: usize, task: F) {
         struct Shared<F> {
             task: F,
-            panicked: core::sync::atomic::AtomicBool,
+            panic: std::sync::Mutex<Option<String>>,
+        }
+        impl<F> Shared<F> {
+            fn lock(&self) -> std::sync::MutexGuard<'_, Option<String>> {
+                self.panic.lock().unwrap_or_else(|e| e.into_inner())
+            }
         }
         unsafe extern "C" fn run<F: Fn(usize) + Sync>(data: *const c_void, index: usize) {
             // SAFETY: `data` is the `Shared` below, alive until `parallel_for` returns.
             let shared = unsafe { &*data.cast::<Shared<F>>() };
             let call = std::panic::AssertUnwindSafe(|| (shared.task)(index));
-            if std::panic::catch_unwind(call).is_err() {
-                shared
-                    .panicked
-                    .store(true, core::sync::atomic::Ordering::Relaxed);
+            if let Err(payload) = std::panic::catch_unwind(call) {
+                let text = crate::export::panic_text(payload);
+                shared.lock().get_or_insert(text);
             }
         }
         let shared = Shared {
             task,
-            panicked: false.into(),
+            panic: None.into(),
         };
         // SAFETY: the host calls `run` only before it returns, and `Shared<F>` may be used from any thread (`F: Sync`).
         unsafe {
             let t = &*self.table;
             (t.parallel_for)(t.ctx, count, run::<F> as Task, (&raw const shared).cast());
         }
-        if shared.panicked.into_inner() {
-            panic!("a parallel task panicked");
+        if let Some(text) = shared.lock().take() {
+            std::panic::resume_unwind(Box::new(crate::export::TaskPanic(text)));
         }
     }
 }

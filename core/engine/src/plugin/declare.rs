@@ -12,10 +12,17 @@ pub(super) fn declaration(header: &PluginHeader, kind: PluginKind) -> Result<Plu
             "has the name {name:?}; letters, digits, '-' and '_' are allowed"
         ));
     }
-    if (header.param_size as usize) < size_of::<abi::ParamDecl>() {
+    let size = header.param_size as usize;
+    if size < size_of::<abi::ParamDecl>() || !size.is_multiple_of(align_of::<abi::ParamDecl>()) {
         return Err(format!(
-            "its parameter declarations have {} bytes each",
-            header.param_size
+            "its parameter declarations have {size} bytes each instead of {}",
+            size_of::<abi::ParamDecl>()
+        ));
+    }
+    if header.param_count > 0 && (header.params.is_null() || !header.params.is_aligned()) {
+        return Err(format!(
+            "promises {} parameter declarations and has none",
+            header.param_count
         ));
     }
     let mut params = Vec::new();

@@ -1,6 +1,6 @@
 //! Instances behind the shapes of the ordinary traits, with every answer checked.
 
-use super::host::take_failure;
+use super::host::{pending_failure, take_failure};
 use super::instance::Instance;
 use crate::error::{Error, Result};
 use resolvent_api::abi::*;
@@ -8,7 +8,7 @@ use resolvent_api::medium::{MediumInfo, medium_traits};
 use resolvent_api::operator::{Coefficients, Flight, FlightDraws, Segment};
 use resolvent_api::phase::MediumPoint;
 use resolvent_api::surface::{SurfacePoint, bsdf_traits};
-use resolvent_api::{Closure, PluginKind, Spectrum, Vec3};
+use resolvent_api::{Closure, Event, PluginKind, Spectrum, Vec3};
 use std::ffi::c_void;
 use std::sync::Arc;
 
@@ -55,6 +55,8 @@ pub struct ForeignMedium {
     pub info: MediumInfo,
     /// Its phase functions; isotropic scattering if it has none.
     pub phases: Vec<ForeignPhase>,
+    /// Index of the last phase function a flight may name.
+    last_phase: u32,
     table: &'static MediumTable,
     pointer: *const c_void,
 }
@@ -76,8 +78,7 @@ impl ForeignMedium {
         let pointer = instance.pointer.cast_const();
         let mut info = MediumInfo::default();
         // SAFETY: a live instance of this table's plugin.
-        check(unsafe { (table.info)(pointer, &mut info) })
-            .map_err(|f| Error::Plugin(format!("{}: {}", instance.plugin.title(), f.0)))?;
+        check(unsafe { (table.info)(pointer, &mut info) }).map_err(|f| instance.error(&f.0))?;
         let sound = info.sigma_max.is_finite()
             && info.sigma_max.0.iter().all(|s| *s >= 0.0)
             && info
@@ -87,9 +88,9 @@ impl ForeignMedium {
                 .chain(&info.bounds.max)
                 .all(|v| !v.is_nan());
         if !sound {
-            let title = instance.plugin.title();
-            return Err(Error::Plugin(format!(
-                "{title}: claims impossible bounds or extinction"
+            return Err(instance.error(&format!(
+                "claims impossible bounds or extinction: {:?}, largest extinction {:?}",
+                info.bounds, info.sigma_max.0
             )));
         }
         if info.bounds.is_empty() {
@@ -100,10 +101,11 @@ impl ForeignMedium {
             .iter()
             .filter(|(_, n)| n.plugin.kind == PluginKind::Phase)
             .map(|(_, n)| ForeignPhase::new(n.clone()))
-            .collect::<Result<_>>()?;
+            .collect::<Result<Vec<_>>>()?;
         Ok(Self {
             instance: Arc::new(instance),
             info,
+            last_phase: phases.len().saturating_sub(1) as u32,
             phases,
             table,
             pointer,
@@ -145,7 +147,9 @@ impl ForeignMedium {
         let good = sum.is_finite()
             && flight.t >= s.t0
             && flight.t <= s.t1
-            && !flight.ratio.0.iter().any(|r| r.is_nan());
+            && !flight.ratio.0.iter().any(|r| r.is_nan())
+            && flight.event <= Event::Collided as u32
+            && flight.phase <= self.last_phase;
         if good {
             Ok(flight)
         } else {
@@ -177,7 +181,7 @@ impl ForeignMedium {
 #[cold]
 fn bad_flight(s: &Segment, f: &Flight) -> Failure {
     Failure(format!(
-        "gave a flight that is not finite or leaves its segment: {f:?} on {s:?}"
+        "gave an impossible flight (not finite, beyond its segment, or of an unknown event or phase function): {f:?} on {s:?}"
     ))
 }
 
@@ -230,6 +234,9 @@ impl ForeignBsdf {
         let table = unsafe { instance.table::<BsdfTable>() };
         // SAFETY: a live instance of this table's plugin.
         let traits = unsafe { (table.traits)(instance.pointer) };
+        if let Some(why) = pending_failure() {
+            return Err(instance.error(&why));
+        }
         Ok(Self {
             instance,
             table,
@@ -276,7 +283,9 @@ impl ForeignIntegrator {
     /// Renders a piece of work.
     pub fn render(&self, scene: &SceneTable, tile: &Tile, out: &OutputTable) -> Call<()> {
         // SAFETY: a live instance of this table's plugin; the tables live for the call.
-        check(unsafe { (self.table.render)(self.instance.pointer, scene, tile, out) })
+        check(unsafe { (self.table.render)(self.instance.pointer, scene, tile, out) })?;
+        // A closure may panic where it has no status to say so: that must not pass unseen.
+        pending_failure().map_or(Ok(()), |why| Err(Failure(why)))
     }
 
     /// As errors name it.

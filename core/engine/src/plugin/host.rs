@@ -44,9 +44,13 @@ pub(crate) fn warn(message: impl Into<String>) {
 
 /// Takes the message of the plugin call on this thread that just failed.
 pub(super) fn take_failure() -> String {
-    FAILURE
-        .with(|f| f.borrow_mut().take())
-        .unwrap_or_else(|| "failed without saying why".into())
+    pending_failure().unwrap_or_else(|| "failed without saying why".into())
+}
+
+/// Takes what a plugin reported on this thread and nobody asked for yet, if anything: calls without a status (a BSDF's traits,
+/// a closure's lobes) report a panic in this way alone.
+pub(crate) fn pending_failure() -> Option<String> {
+    FAILURE.with(|f| f.borrow_mut().take())
 }
 
 /// The table every plugin is given.

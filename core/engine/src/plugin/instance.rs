@@ -1,13 +1,13 @@
 //! Making and ending plugin instances.
 
-use super::host::{HOST, take_failure};
+use super::host::{HOST, pending_failure, take_failure, warn};
 use super::load::Plugin;
 use crate::error::{Error, Result};
 use resolvent_api::Affine;
 use resolvent_api::abi::{self, CreateArgs, ParamValue, PluginKind, Text};
 use resolvent_scene::{Checked, ParamKind, Place, PluginBlock, Problem, Value};
 use std::ffi::c_void;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A plugin's instance and the nested ones it refers to, which outlive it.
@@ -17,6 +17,8 @@ pub struct Instance {
     /// Nested instances by parameter name, in order of declaration.
     pub nested: Vec<(String, Arc<Instance>)>,
     pub(super) pointer: *mut c_void,
+    /// Scene file and place of the block that it was made from.
+    pub(super) at: (PathBuf, Place),
 }
 
 // SAFETY: the ABI asks that instances may be used from any thread, several at once.
@@ -87,6 +89,8 @@ impl Instance {
             reserved: 0,
         };
         let create = functions(&plugin).0;
+        // What an earlier call left behind is not why this one fails.
+        pending_failure();
         // SAFETY: the table was checked when the plugin was loaded; `args` and all it points to live for the call.
         let pointer = unsafe { create(&args) };
         if pointer.is_null() {
@@ -97,7 +101,19 @@ impl Instance {
             plugin,
             nested,
             pointer,
+            at: (at.0.to_path_buf(), at.1.clone()),
         })
+    }
+
+    /// An error of the plugin, with the place of its block in the scene.
+    pub(super) fn error(&self, why: &str) -> Error {
+        let (file, place) = &self.at;
+        Problem::new(
+            file,
+            place.clone(),
+            format!("{}: {why}", self.plugin.title()),
+        )
+        .into()
     }
 
     /// The table of the plugin's kind.
@@ -115,6 +131,10 @@ impl Drop for Instance {
         let destroy = functions(&self.plugin).1;
         // SAFETY: `pointer` came from this plugin's `create` and is ended once.
         unsafe { destroy(self.pointer) }
+        // The picture is not touched by what goes wrong at the end, so it stays a warning.
+        if let Some(why) = pending_failure() {
+            warn(format!("{}: {why}", self.plugin.title()));
+        }
     }
 }
 

@@ -27,12 +27,18 @@ impl Plugin {
     /// If it is no library, no plugin, or one of another ABI version; the message says which side to update.
     pub fn open(path: &Path) -> Result<Self> {
         let fail = |why: String| Error::Plugin(format!("{}: {why}", path.display()));
-        if !path.is_file() {
-            return Err(fail("there is no such file".into()));
+        match std::fs::metadata(path) {
+            Err(e) => return Err(fail(format!("cannot be opened ({e})"))),
+            Ok(m) if !m.is_file() => return Err(fail("is no file".into())),
+            Ok(_) => {}
         }
         // SAFETY: loading a library runs its initialisers; a plugin is code that the user chose to run.
-        let library = unsafe { libloading::Library::new(path) }
-            .map_err(|e| fail(format!("is no loadable shared library ({})", reason(&e))))?;
+        let library = unsafe { libloading::Library::new(path) }.map_err(|e| {
+            let why = reason(&e, path);
+            fail(format!(
+                "is no shared library that can be loaded here ({why})"
+            ))
+        })?;
         // SAFETY: the symbol is only used as an address here; what it points to is checked field by field.
         let symbol = unsafe { library.get::<*const u8>(SYMBOL.as_bytes()) }.map_err(|_| {
             fail(format!(
@@ -89,7 +95,7 @@ impl Plugin {
         };
         // SAFETY: magic, version and size say that a complete header of this version is there, in a library that stays.
         let header: &'static PluginHeader = unsafe { &*header };
-        if header.table.is_null() {
+        if header.table.is_null() || !header.table.cast::<usize>().is_aligned() {
             return Err(fail("has no function table".into()));
         }
         let needed = match kind {
@@ -130,11 +136,13 @@ impl Plugin {
     }
 }
 
-/// The system's reason without the path, which the message already has.
-fn reason(e: &libloading::Error) -> String {
+/// The system's reason without the path, which the message already has. Other files in it stay: a library that this one needs
+/// may be what is missing.
+fn reason(e: &libloading::Error, path: &Path) -> String {
     use std::error::Error as _;
     let text = e
         .source()
         .map_or_else(|| e.to_string(), ToString::to_string);
-    text.rsplit(": ").next().unwrap_or(&text).to_owned()
+    let own = format!("{}: ", path.display());
+    text.strip_prefix(&own).unwrap_or(&text).to_owned()
 }

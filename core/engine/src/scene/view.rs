@@ -173,12 +173,13 @@ unsafe fn view<'a>(ctx: *const c_void) -> &'a View<'a> {
 
 unsafe extern "C" fn camera_ray(
     ctx: *const c_void,
+    pixel: *const [u32; 2],
     film: *const [f32; 2],
     lens: *const [f32; 2],
     out: *mut CameraRay,
 ) -> Status {
     // SAFETY: integrators pass on the table's ctx and valid pointers; the same below.
-    unsafe { *out = view(ctx).scene.camera.ray(*film, *lens) };
+    unsafe { *out = view(ctx).scene.camera.ray(*pixel, *film, *lens) };
     Status::OK
 }
 
@@ -296,5 +297,6 @@ unsafe extern "C" fn connect<const SURFACES: bool, const MEDIA: u8>(
 unsafe extern "C" fn fault(ctx: *const c_void, vertex: *const Vertex, message: Text) -> Status {
     // SAFETY: as above.
     let (v, vertex, message) = unsafe { (view(ctx), &*vertex, message.to_owned()) };
-    v.fail(format!("{} {message}", v.scene.scatterer(vertex)))
+    let said = crate::plugin::pending_failure().map_or_else(String::new, |why| format!(": {why}"));
+    v.fail(format!("{} {message}{said}", v.scene.scatterer(vertex)))
 }
