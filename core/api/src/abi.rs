@@ -423,9 +423,11 @@ pub struct SceneTable {
     pub reserved: u32,
     /// Passed back to the functions.
     pub ctx: *const c_void,
-    /// Ray through the film position `film` (pixels), lens position from `lens` (unit square).
+    /// Ray of a sample of `pixel` (column, row). `film` are two random numbers that the reconstruction filter turns into a
+    /// position around the pixel's centre, `lens` two for the position on the lens.
     pub camera_ray: unsafe extern "C" fn(
         ctx: *const c_void,
+        pixel: *const [u32; 2],
         film: *const [f32; 2],
         lens: *const [f32; 2],
         out: *mut CameraRay,

@@ -199,7 +199,8 @@ impl Extent {
                         }
                         continue;
                     }
-                    let (a, b) = ((-1.0 - o[i]) / d[i], (1.0 - o[i]) / d[i]);
+                    let inverse = 1.0 / d[i];
+                    let (a, b) = ((-1.0 - o[i]) * inverse, (1.0 - o[i]) * inverse);
                     near = near.max(a.min(b));
                     far = far.min(a.max(b));
                 }

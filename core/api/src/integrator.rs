@@ -75,12 +75,18 @@ impl<'a> SceneView<'a> {
         self.table.lanes
     }
 
-    /// The camera's ray through `film` (pixels) and `lens` (unit square).
+    /// The camera's ray for a sample of `pixel` (column, row), by two random numbers for the film and two for the lens.
     #[inline(always)]
-    pub fn camera_ray(&self, film: [f32; 2], lens: [f32; 2]) -> Outcome<Option<CameraRay>> {
+    pub fn camera_ray(
+        &self,
+        pixel: [u32; 2],
+        film: [f32; 2],
+        lens: [f32; 2],
+    ) -> Outcome<Option<CameraRay>> {
         let mut ray = CameraRay::default();
         // SAFETY: the table is valid (contract of `new`), pointers live for the call.
-        let status = unsafe { (self.table.camera_ray)(self.table.ctx, &film, &lens, &mut ray) };
+        let status =
+            unsafe { (self.table.camera_ray)(self.table.ctx, &pixel, &film, &lens, &mut ray) };
         Ok(found(status)?.then_some(ray))
     }
 

@@ -6,6 +6,7 @@
 mod camera;
 mod error;
 pub mod film;
+mod filter;
 pub mod geometry;
 pub mod light;
 pub mod plugin;

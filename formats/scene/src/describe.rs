@@ -196,7 +196,7 @@ impl Default for Filter {
 /// A layer that is recorded beside the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Aov {
-    /// Distance along the viewing axis to the first collision or surface.
+    /// Distance from the camera to the first collision or surface, along the ray.
     Depth,
     /// Albedo there.
     Albedo,

@@ -34,9 +34,9 @@ impl Bounds {
     }
 }
 
-/// Eight child boxes, one lane each, and what the lanes lead to. 224 bytes.
+/// Eight child boxes, one lane each, and what the lanes lead to. Four cache lines.
 #[derive(Clone, Debug)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct Node8 {
     /// Rows min x, max x, min y, max y, min z, max z. An unused lane holds an inverted infinite box, which no ray meets.
     pub bounds: [[f32; 8]; 6],

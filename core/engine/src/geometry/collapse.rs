@@ -11,10 +11,11 @@ use obvhs::bvh2::Bvh2;
 
 use super::triangle::LANES;
 
-/// Cost of testing a node's eight boxes and sorting what is met, relative to [`PACKET_COST`].
+/// Cost of testing a node's eight boxes and sorting what is met.
 const NODE_COST: f32 = 1.0;
-/// Cost of testing a packet of triangles.
-const PACKET_COST: f32 = 1.0;
+/// Cost of testing a packet of triangles. The ratio was found with `examples/rays.rs`: 0.3 beats 0.5, 1 and 2, since larger leaves
+/// also save memory traffic.
+const PACKET_COST: f32 = 0.3;
 /// Most primitives in one leaf: two packets of triangles, or as many spheres.
 const MAX_LEAF: u32 = 2 * LANES as u32;
 
@@ -69,7 +70,9 @@ impl Plan {
         self.entries[n as usize].leaf
     }
 
-    /// The up to eight children of inner node `n` of the wide hierarchy.
+    /// The up to eight children of inner node `n` of the wide hierarchy, largest first. Occlusion queries take children from the
+    /// last, so that they try small boxes first: these are cheap, and likelier to hold something in the way (1.3 times the speed of
+    /// shadow rays in the order that the splits give).
     pub fn children(&self, binary: &Bvh2, n: u32) -> Vec<Step> {
         let mut out = Vec::with_capacity(8);
         let first = binary.nodes[n as usize].first_index;
@@ -94,6 +97,10 @@ impl Plan {
                 });
             }
         }
+        let area = |s: &Step| match *s {
+            Step::Leaf(n) | Step::Inner(n) => binary.nodes[n as usize].aabb().half_area(),
+        };
+        out.sort_by(|a, b| area(b).total_cmp(&area(a)));
         out
     }
 

@@ -1,8 +1,9 @@
 //! Slab and triangle kernels in plain Rust: the reference for [`super::simd`], lane by lane the same operations in the same
 //! order, so that both give the same bits.
 
-use super::bvh8::Node8;
+use super::bvh8::{Child, Node8};
 use super::ray::RaySetup;
+use super::traverse::Tree;
 use super::triangle::{LANES, Packet, PacketHits, TINY_DET, decide_lane, gamma};
 
 /// Entry distances of the eight children of a node.
@@ -14,6 +15,9 @@ pub(super) struct Near(pub [f32; 8]);
 pub(super) trait Kernel: Copy {
     /// Mask of children whose boxes the ray may meet in \[t_min, `t_max`\], and their entry distances.
     fn node(self, ray: &RaySetup, node: &Node8, t_max: f32) -> (u32, Near);
+
+    /// Starts loading what `child` leads to. A hint only.
+    fn prefetch(self, tree: &Tree, child: Child);
 
     /// Mask of triangles hit in (t_min, `t_max`\], with t and barycentrics in `hits`. These depend on ray and triangle alone,
     /// not on `t_max`, which shrinks during a traversal.
@@ -43,6 +47,9 @@ fn mask<const N: usize>(f: impl Fn(usize) -> bool) -> u32 {
 }
 
 impl Kernel for Portable {
+    #[inline(always)]
+    fn prefetch(self, _: &Tree, _: Child) {}
+
     #[inline(always)]
     fn node(self, ray: &RaySetup, node: &Node8, t_max: f32) -> (u32, Near) {
         let mut near = [ray.t_min; 8];

@@ -5,7 +5,7 @@
 
 use std::arch::x86_64::*;
 
-use super::bvh8::Node8;
+use super::bvh8::{Child, Node8};
 use super::portable::{Kernel, Near, decide};
 use super::ray::RaySetup;
 use super::traverse::{self, Candidate, Tree};
@@ -67,6 +67,28 @@ fn occluded_avx2<F: FnMut(&Candidate) -> bool>(
 }
 
 impl Kernel for Avx2 {
+    #[inline(always)]
+    fn prefetch(self, tree: &Tree, child: Child) {
+        // A node, or the two packets that most leaves have.
+        let (start, lines): (*const i8, usize) = if !child.is_leaf() {
+            (tree.nodes.as_ptr().wrapping_add(child.0 as usize).cast(), 4)
+        } else if !child.is_spheres() {
+            (
+                tree.packets
+                    .as_ptr()
+                    .wrapping_add(child.items().start)
+                    .cast(),
+                5,
+            )
+        } else {
+            return;
+        };
+        for line in 0..lines {
+            // SAFETY: a prefetch does not access memory, whatever the address.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.wrapping_add(64 * line)) };
+        }
+    }
+
     #[inline(always)]
     fn node(self, ray: &RaySetup, node: &Node8, t_max: f32) -> (u32, Near) {
         // SAFETY: `self` proves that AVX2 is available. Each load reads one row of eight f32; rows are 32 bytes apart in a

@@ -116,6 +116,7 @@ where
                 current = node.child[lane & 7];
                 continue;
             }
+            k.prefetch(tree, node.child[lane & 7]);
             // Push in order of decreasing distance by insertion, then take the nearest off the top.
             let base = height;
             stack[height] = entry(near.0[lane & 7], node.child[lane & 7]);
@@ -123,6 +124,7 @@ where
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & 7;
                 mask &= mask - 1;
+                k.prefetch(tree, node.child[lane]);
                 let new = entry(near.0[lane], node.child[lane]);
                 let mut at = height;
                 while at > base && stack[at - 1] < new {
@@ -202,18 +204,25 @@ where
     let t_max = ray.t_max;
     let mut blocks = |c: Candidate| c.t < t_max && opaque(&c);
     let mut stack = [0u32; N];
-    let mut height = 1; // The root, node 0, is on the stack.
-    while height > 0 {
-        height -= 1;
-        let current = Child(stack[height]);
+    let mut height = 0;
+    let mut current = Child::node(0);
+    loop {
         if !current.is_leaf() {
             let node = &tree.nodes[current.0 as usize];
             let (mut mask, _) = k.node(ray, node, t_max);
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                stack[height] = node.child[lane].0;
-                height += 1;
+            if mask != 0 {
+                loop {
+                    let lane = mask.trailing_zeros() as usize & 7;
+                    mask &= mask - 1;
+                    if mask == 0 {
+                        current = node.child[lane];
+                        break;
+                    }
+                    k.prefetch(tree, node.child[lane]);
+                    stack[height] = node.child[lane].0;
+                    height += 1;
+                }
+                continue;
             }
         } else if current.is_spheres() {
             for ball in &tree.balls[current.items()] {
@@ -246,6 +255,10 @@ where
                 }
             }
         }
+        if height == 0 {
+            return false;
+        }
+        height -= 1;
+        current = Child(stack[height]);
     }
-    false
 }

@@ -4,6 +4,7 @@ use super::shapes::{Wide, affine};
 use super::{Material, PlacedMedium, Surface};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
 use crate::light::{Area, ImageEnvironment, Light, Lights};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
@@ -209,6 +210,7 @@ impl Scene {
             scene.film.resolution,
             c.lens_radius,
             c.focus_distance,
+            Filter::new(scene.film.filter),
         );
         let has_null_surfaces = surfaces.iter().any(|s| s.null);
         let traits = traits(&media, accel.is_some(), &lights, lanes);

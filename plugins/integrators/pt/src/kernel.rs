@@ -32,15 +32,14 @@ impl Kernel<'_> {
     pub fn path<const CHROMATIC: bool>(
         &self,
         sampler: &Sampler,
-        pixel: [f32; 2],
+        pixel: [u32; 2],
         features: bool,
     ) -> Outcome<PixelSample> {
         let scene = self.scene;
         let lanes = scene.lanes();
         let mut out = PixelSample::default();
         let (film, lens) = sampler.camera();
-        let film = [pixel[0] + film[0], pixel[1] + film[1]];
-        let Some(ray) = scene.camera_ray(film, lens)? else {
+        let Some(ray) = scene.camera_ray(pixel, film, lens)? else {
             return Ok(out);
         };
 

@@ -67,12 +67,12 @@ impl Integrator for PathTracer {
         };
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
         if scene.is_grey() {
-            each_sample(tile, scene, out, |s, film, features| {
-                kernel.path::<false>(s, film, features)
+            each_sample(tile, scene, out, |s, pixel, features| {
+                kernel.path::<false>(s, pixel, features)
             })
         } else {
-            each_sample(tile, scene, out, |s, film, features| {
-                kernel.path::<true>(s, film, features)
+            each_sample(tile, scene, out, |s, pixel, features| {
+                kernel.path::<true>(s, pixel, features)
             })
         }
     }
@@ -83,7 +83,7 @@ fn each_sample(
     tile: &Tile,
     scene: &SceneView<'_>,
     out: &mut Output<'_>,
-    path: impl Fn(&Sampler, [f32; 2], bool) -> Outcome<PixelSample>,
+    path: impl Fn(&Sampler, [u32; 2], bool) -> Outcome<PixelSample>,
 ) -> Outcome<()> {
     let features = tile.features != 0;
     for y in tile.min[1]..tile.max[1] {
@@ -91,7 +91,7 @@ fn each_sample(
             let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
             for i in tile.sample_begin..tile.sample_end {
                 let sampler = Sampler::new(tile.seed, pixel, i, scene.lanes());
-                let sample = path(&sampler, [x as f32, y as f32], features)?;
+                let sample = path(&sampler, [x, y], features)?;
                 out.add(x, y, &sample)?;
             }
         }
