@@ -1,2 +1,54 @@
-//! The `resolvent` command.
-fn main() {}
+//! The `resolvent` command: renders scenes and volumes, and says what is in files and plugins.
+//!
+//! Results go to standard output, everything else to standard error. Exit codes: 0 done, 1 something failed, 2 usage or
+//! input error, 3 interrupted with the finished part saved.
+
+mod args;
+mod compare;
+mod console;
+mod failure;
+mod info;
+mod input;
+mod interrupt;
+mod output;
+mod overrides;
+mod plugin;
+mod progress;
+mod render;
+mod stats;
+mod system;
+mod values;
+mod volume;
+
+use clap::Parser;
+use failure::Failure;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // A broken pipe (`resolvent info … | head`) ends the program like any other tool, not with a panic.
+    std::panic::set_hook(Box::new(|panic| {
+        let text = panic.to_string();
+        if !text.contains("Broken pipe") {
+            eprintln!(
+                "error: internal error, a bug in resolvent: {}",
+                text.replace('\n', " ")
+            );
+        }
+    }));
+    let args = args::Args::parse();
+    let outcome = std::panic::catch_unwind(|| match args.command {
+        args::Command::Render(a) => render::run(&a),
+        args::Command::Info(a) => info::run(&a),
+        args::Command::Compare(a) => compare::run(&a),
+        args::Command::Plugin(a) => plugin::run(&a),
+        args::Command::Schema(a) => plugin::schema(&a),
+    });
+    match outcome {
+        Ok(Ok(code)) => code.into(),
+        Ok(Err(Failure { code, message })) => {
+            eprintln!("error: {message}");
+            code.into()
+        }
+        Err(_) => failure::Code::Failed.into(),
+    }
+}

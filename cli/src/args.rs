@@ -1,0 +1,315 @@
+//! The command line.
+
+use crate::values::{
+    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, positive, share,
+};
+use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  resolvent render cloud.vdb -o cloud.png          a VDB file, with camera and light chosen for it
+  resolvent render scene.json -o out.exr -o out.png --spp 256
+  resolvent info cloud.vdb                         its grids, bounds and optical thickness
+  resolvent compare out.exr reference.exr          is the difference more than noise?
+  resolvent plugin list                            media, phase functions, materials, integrators
+
+Exit codes: 0 done, 1 something failed, 2 usage or input error, 3 interrupted with the finished part saved.";
+
+/// Physically based rendering of volumes
+#[derive(Debug, Parser)]
+#[command(name = "resolvent", version, after_help = EXAMPLES)]
+pub struct Args {
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render a scene, or a VDB file as it is
+    Render(Box<Render>),
+    /// Say what is in a VDB file, a scene or an EXR image
+    Info(Info),
+    /// Compare an image with a reference
+    Compare(Compare),
+    /// List plugins, or describe one
+    Plugin(Plugin),
+    /// Print the JSON Schema of scene files, with the parameters of all plugins found
+    Schema(Schema),
+}
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  resolvent render cloud.vdb -o cloud.png
+  resolvent render cloud.vdb --optical-thickness 20 --sun 1,0.3,0.5 --save-scene cloud.json
+  resolvent render scene.json -o out.exr --time 60 --aov depth,variance
+  resolvent render scene.json -o tile.exr --crop 0,0,320,180
+  resolvent render scene.json -o part2.exr --sample-range 64..128    (merge: mean of parts by samples)
+
+Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once.";
+
+/// Options of `render`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = RENDER_EXAMPLES)]
+pub struct Render {
+    /// A scene (.json) or an OpenVDB file (.vdb)
+    pub input: PathBuf,
+    /// Picture to write, .exr or .png; may be given several times [default: the input's name with .exr, in the current
+    /// folder]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+
+    /// Samples per pixel
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), group = "budget", help_heading = "Sampling")]
+    pub spp: Option<u64>,
+    /// Sample for so many seconds
+    #[arg(long, value_name = "S", value_parser = positive, group = "budget", help_heading = "Sampling")]
+    pub time: Option<f64>,
+    /// Sample until the estimated relative error of the picture (root mean square) is at most this, such as 0.02
+    #[arg(long, value_name = "E", value_parser = positive, group = "budget", help_heading = "Sampling")]
+    pub error: Option<f64>,
+    /// Take samples A up to, not including, B of every pixel's sequence; parts merge to one run
+    #[arg(long, value_name = "A..B", group = "budget", help_heading = "Sampling")]
+    pub sample_range: Option<Samples>,
+    /// Seed of all random numbers
+    #[arg(long, value_name = "N", help_heading = "Sampling")]
+    pub seed: Option<u64>,
+    /// Threads; 0 is one per processor. The picture does not depend on it
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Sampling")]
+    pub threads: u16,
+    /// Integrator plugin, by name or path
+    #[arg(long, value_name = "NAME", help_heading = "Sampling")]
+    pub integrator: Option<String>,
+
+    /// Width and height in pixels
+    #[arg(long, value_name = "WxH", help_heading = "Picture")]
+    pub resolution: Option<Size>,
+    /// Render only this window; X1 and Y1 are outside of it
+    #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Picture")]
+    pub crop: Option<Window>,
+    /// Further layers of EXR files
+    #[arg(
+        long,
+        value_name = "LAYER",
+        value_delimiter = ',',
+        help_heading = "Picture"
+    )]
+    pub aov: Vec<Layer>,
+    /// Exposure of PNG files, in stops
+    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Picture")]
+    pub exposure: f64,
+    /// How PNG files bring large values into the display's range
+    #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic, help_heading = "Picture")]
+    pub tone_map: ToneCurve,
+
+    /// What to choose instead of guessing, for VDB files
+    #[command(flatten)]
+    pub guesses: Guesses,
+
+    /// Where to look for plugins first
+    #[command(flatten)]
+    pub plugins: PluginPath,
+    /// Write figures about the run: plugins, files, memory, counts, times
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// Write the scene as it is rendered, options and guesses included
+    #[arg(long, value_name = "FILE.json")]
+    pub save_scene: Option<PathBuf>,
+    /// Print only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Options that replace guesses about a VDB file.
+#[derive(Debug, Default, ClapArgs)]
+#[command(next_help_heading = "VDB files (each replaces a guess)")]
+pub struct Guesses {
+    /// Grid of densities
+    #[arg(long, value_name = "NAME")]
+    pub grid: Option<String>,
+    /// Extinction per world unit where the grid is 1
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub density_scale: Option<f64>,
+    /// Choose the density scale so that the volume has this optical thickness
+    #[arg(long, value_name = "T", value_parser = positive, conflicts_with = "density_scale")]
+    pub optical_thickness: Option<f64>,
+    /// Share of the extinction that is scattering: one number or R,G,B
+    #[arg(long, value_name = "A", value_parser = share)]
+    pub albedo: Option<Color>,
+    /// Mean cosine of the phase function (Henyey-Greenstein)
+    #[arg(long, value_name = "G", value_parser = cosine, allow_hyphen_values = true)]
+    pub g: Option<f64>,
+    /// Direction towards the sun, or none
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    pub sun: Option<MaybeDirection>,
+    /// The sun's irradiance on a plane facing it: one number or R,G,B
+    #[arg(long, value_name = "E")]
+    pub sun_irradiance: Option<Color>,
+    /// Radiance of the sky: one number or R,G,B, or none
+    #[arg(long, value_name = "L")]
+    pub sky: Option<MaybeColor>,
+    /// Where the camera stands and the point it looks at
+    #[arg(long, value_name = "X,Y,Z,TX,TY,TZ", allow_hyphen_values = true)]
+    pub camera: Option<View>,
+    /// Full horizontal field of view in degrees
+    #[arg(long, value_name = "DEG", value_parser = positive)]
+    pub fov: Option<f64>,
+    /// The axis that is up
+    #[arg(long, value_name = "AXIS", value_enum)]
+    pub up: Option<Up>,
+    /// Grid of temperatures that glows as a black body, or none
+    #[arg(long, value_name = "NAME")]
+    pub temperature_grid: Option<String>,
+    /// Grid of emission, or none
+    #[arg(long, value_name = "NAME")]
+    pub flame_grid: Option<String>,
+    /// Factor on what these two emit
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub emission_scale: Option<f64>,
+}
+
+impl Guesses {
+    /// The first option given, for inputs that take none.
+    pub fn given(&self) -> Option<&'static str> {
+        let all = [
+            ("--grid", self.grid.is_some()),
+            ("--density-scale", self.density_scale.is_some()),
+            ("--optical-thickness", self.optical_thickness.is_some()),
+            ("--albedo", self.albedo.is_some()),
+            ("--g", self.g.is_some()),
+            ("--sun", self.sun.is_some()),
+            ("--sun-irradiance", self.sun_irradiance.is_some()),
+            ("--sky", self.sky.is_some()),
+            ("--camera", self.camera.is_some()),
+            ("--fov", self.fov.is_some()),
+            ("--up", self.up.is_some()),
+            ("--temperature-grid", self.temperature_grid.is_some()),
+            ("--flame-grid", self.flame_grid.is_some()),
+            ("--emission-scale", self.emission_scale.is_some()),
+        ];
+        all.into_iter()
+            .find(|(_, given)| *given)
+            .map(|(name, _)| name)
+    }
+}
+
+/// The axis that is up.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum Up {
+    /// As Houdini has it
+    Y,
+    /// As Blender has it
+    Z,
+}
+
+/// Where to look for plugins.
+#[derive(Debug, ClapArgs)]
+pub struct PluginPath {
+    /// Look for plugins here first, then in RESOLVENT_PLUGIN_PATH and beside the program; may be given several times
+    #[arg(long, value_name = "DIR")]
+    pub plugin_path: Vec<PathBuf>,
+}
+
+/// Further layers.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum Layer {
+    /// Distance to the first collision or surface
+    Depth,
+    /// Albedo there
+    Albedo,
+    /// Normal there
+    Normal,
+    /// Variance of each pixel's mean
+    Variance,
+    /// Samples taken
+    Samples,
+}
+
+/// Curves of PNG files.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum ToneCurve {
+    /// Values above 1 are white
+    Srgb,
+    /// Large values fade into white (Narkowicz's fit of the ACES curve)
+    Filmic,
+}
+
+/// Options of `info`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent info cloud.vdb\n  resolvent info scene.json\n  resolvent info out.exr --json"
+)]
+pub struct Info {
+    /// A VDB file, a scene or an EXR image
+    pub file: PathBuf,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `compare`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent compare out.exr reference.exr\n  resolvent compare out.exr reference.exr --fail && echo same picture\n\nThe z-test needs a layer `variance` in at least one of the images (render with --aov variance)."
+)]
+pub struct Compare {
+    /// The image
+    pub image: PathBuf,
+    /// The reference
+    pub reference: PathBuf,
+    /// Regions of the z-test, across and down
+    #[arg(long, value_name = "WxH", default_value = "8x8")]
+    pub regions: Size,
+    /// End with exit code 1 if noise does not explain the difference
+    #[arg(long)]
+    pub fail: bool,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `plugin`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so"
+)]
+pub struct Plugin {
+    /// What to do
+    #[command(subcommand)]
+    pub action: PluginAction,
+}
+
+/// What to do with plugins.
+#[derive(Debug, Subcommand)]
+pub enum PluginAction {
+    /// List the plugins found
+    List {
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+        /// Where to look first
+        #[command(flatten)]
+        plugins: PluginPath,
+    },
+    /// Describe a plugin and its parameters
+    Info {
+        /// A plugin's name, or the path of its library
+        name: String,
+        /// Print JSON
+        #[arg(long)]
+        json: bool,
+        /// Where to look first
+        #[command(flatten)]
+        plugins: PluginPath,
+    },
+}
+
+/// Options of `schema`.
+#[derive(Debug, ClapArgs)]
+pub struct Schema {
+    /// Where to look for plugins first
+    #[command(flatten)]
+    pub plugins: PluginPath,
+}

@@ -1,0 +1,59 @@
+//! What kind of file the user gave.
+
+use crate::failure::{Outcome, input};
+use std::io::Read;
+use std::path::Path;
+
+/// Kinds of files that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// A scene, JSON.
+    Scene,
+    /// An OpenVDB file.
+    Vdb,
+    /// An OpenEXR image.
+    Exr,
+}
+
+/// First bytes of OpenVDB files.
+const VDB_MAGIC: [u8; 4] = [0x20, 0x42, 0x44, 0x56];
+/// First bytes of OpenEXR files.
+const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+
+/// Tells the kind of a file by its name, or else by its first bytes.
+pub fn kind(path: &Path) -> Outcome<Kind> {
+    let named = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_lowercase())
+        .and_then(|e| match e.as_str() {
+            "json" => Some(Kind::Scene),
+            "vdb" => Some(Kind::Vdb),
+            "exr" => Some(Kind::Exr),
+            _ => None,
+        });
+    let failed = |e: std::io::Error| input(format!("{}: {e}", path.display()));
+    if path.is_dir() {
+        return Err(input(format!("{}: is a folder", path.display())));
+    }
+    let mut file = std::fs::File::open(path).map_err(failed)?;
+    if let Some(kind) = named {
+        return Ok(kind);
+    }
+    let mut first = Vec::new();
+    file.by_ref()
+        .take(4)
+        .read_to_end(&mut first)
+        .map_err(failed)?;
+    if first == VDB_MAGIC {
+        Ok(Kind::Vdb)
+    } else if first == EXR_MAGIC {
+        Ok(Kind::Exr)
+    } else if first.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
+        Ok(Kind::Scene)
+    } else {
+        Err(input(format!(
+            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb)",
+            path.display()
+        )))
+    }
+}

@@ -1,0 +1,55 @@
+//! Ctrl-C (and the signals that ask a program to end): the first ends the rendering in order, the second the program.
+
+use crate::console;
+use crate::failure::Code;
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
+
+/// Asks the renderer to stop.
+pub static STOP: AtomicBool = AtomicBool::new(false);
+
+static PHASE: AtomicU8 = AtomicU8::new(Phase::Preparing as u8);
+
+/// What the program is doing, which decides what an interruption means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Phase {
+    /// There is nothing to save yet.
+    Preparing = 0,
+    /// What is finished can be saved.
+    Rendering = 1,
+    /// It is being saved.
+    Writing = 2,
+}
+
+/// Tells what the program is doing now.
+pub fn enter(phase: Phase) {
+    PHASE.store(phase as u8, Ordering::SeqCst);
+}
+
+/// True if an interruption was asked for.
+pub fn asked() -> bool {
+    STOP.load(Ordering::SeqCst)
+}
+
+/// Handles interruptions from now on.
+pub fn install() {
+    let handler = || {
+        let phase = PHASE.load(Ordering::SeqCst);
+        if phase == Phase::Preparing as u8 {
+            console::line("error: interrupted before anything was rendered");
+            std::process::exit(Code::Failed as i32);
+        }
+        if STOP.swap(true, Ordering::SeqCst) {
+            console::line("error: aborted");
+            std::process::exit(Code::Failed as i32);
+        }
+        console::line(if phase == Phase::Writing as u8 {
+            "the picture is being written; Ctrl-C again aborts"
+        } else {
+            "stopping and saving what is finished; Ctrl-C again aborts"
+        });
+    };
+    if let Err(e) = ctrlc::set_handler(handler) {
+        console::warning(format!("Ctrl-C will not save what is finished: {e}"));
+    }
+}

@@ -1,0 +1,226 @@
+//! Pictures: checked before rendering, made from the film after it.
+
+use crate::args::{Render, ToneCurve};
+use crate::failure::{Outcome, failed, input};
+use resolvent_engine::Rendered;
+use resolvent_engine::film::{Estimate, Features};
+use resolvent_image::{BEAUTY, Curve, Image, ToneMap};
+use resolvent_scene::{Aov, Scene};
+use std::fs::OpenOptions;
+use std::path::{Path, PathBuf};
+
+/// Formats of pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Exr,
+    Png,
+}
+
+/// A picture to be written.
+#[derive(Clone, Debug)]
+pub struct Target {
+    path: PathBuf,
+    format: Format,
+}
+
+/// The pictures asked for, or the default one; their folders can be written to.
+pub fn targets(a: &Render) -> Outcome<Vec<Target>> {
+    let mut paths = a.output.clone();
+    if paths.is_empty() {
+        let stem = a.input.file_stem().unwrap_or(a.input.as_os_str());
+        let path = PathBuf::from(stem).with_extension("exr");
+        crate::console::info(format!("no -o given: writing {}", path.display()));
+        paths.push(path);
+    }
+    let mut targets: Vec<Target> = Vec::new();
+    for path in paths {
+        let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        let format = match extension.as_deref() {
+            Some("exr") => Format::Exr,
+            Some("png") => Format::Png,
+            _ => {
+                return Err(input(format!(
+                    "{}: cannot tell the format: end the name in .exr or .png",
+                    path.display()
+                )));
+            }
+        };
+        if targets.iter().any(|t| t.path == path) {
+            return Err(input(format!("-o {} is given twice", path.display())));
+        }
+        check_writable(&path)?;
+        targets.push(Target { path, format });
+    }
+    Ok(targets)
+}
+
+/// Makes sure that a file can be written to a place, without touching what is there.
+pub fn check_writable(path: &Path) -> Outcome<()> {
+    if path.is_dir() {
+        return Err(input(format!("{}: is a folder", path.display())));
+    }
+    let folder = match path.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        return Err(input(format!(
+            "{}: there is no folder {}",
+            path.display(),
+            folder.display()
+        )));
+    }
+    let probe = folder.join(format!(".resolvent-{}.tmp", std::process::id()));
+    match OpenOptions::new().write(true).create_new(true).open(&probe) {
+        Ok(_) => {
+            // Left over at worst: an empty file that says whose it is.
+            let _ = std::fs::remove_file(&probe);
+            Ok(())
+        }
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => Ok(()),
+        Err(e) => Err(input(format!(
+            "{}: cannot write to the folder {}: {e}",
+            path.display(),
+            folder.display()
+        ))),
+    }
+}
+
+/// Refuses a picture that memory cannot hold, before the system ends the program for it.
+pub fn check_memory(window: [u32; 4], features: bool, layers: usize) -> Outcome<()> {
+    let pixels = u64::from(window[2] - window[0]) * u64::from(window[3] - window[1]);
+    let sums = size_of::<resolvent_engine::film::Pixel>()
+        + usize::from(features) * size_of::<resolvent_engine::film::FeatureSums>();
+    // The picture is held as f32, and once more while it is written.
+    let need = pixels * (sums + 2 * 4 * (4 + 3 * layers)) as u64;
+    match crate::system::available_memory() {
+        Some(free) if need > free => Err(input(format!(
+            "a picture of {} x {} pixels needs {} of memory, {} are free: render it in parts with --crop",
+            window[2] - window[0],
+            window[3] - window[1],
+            bytes(need),
+            bytes(free)
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// A number of bytes for people.
+pub fn bytes(n: u64) -> String {
+    let units = ["bytes", "kB", "MB", "GB", "TB", "PB", "EB"];
+    let mut value = n as f64;
+    let mut unit = 0;
+    while value >= 1000.0 && unit + 1 < units.len() {
+        value /= 1000.0;
+        unit += 1;
+    }
+    let digits = if unit == 0 || value >= 100.0 { 0 } else { 1 };
+    format!("{value:.digits$} {}", units[unit])
+}
+
+/// The picture with its layers. Layers that cannot be known yet are left out; they are returned.
+pub fn image(scene: &Scene, rendered: &Rendered) -> (Image, Vec<Aov>) {
+    let film = &rendered.film;
+    let [w, h] = film.size();
+    let window = scene.film.window();
+    let count = w as usize * h as usize;
+    let estimates: Vec<Estimate> = (0..count).map(|i| film.estimate(i)).collect();
+    let mut image = Image::new(w as usize, h as usize);
+    image.origin = [window[0] as i32, window[1] as i32];
+    image.full = scene.film.resolution.map(|n| n as usize);
+    let of = |f: &dyn Fn(&Estimate) -> f64| -> Vec<f32> {
+        estimates.iter().map(|e| f(e) as f32).collect()
+    };
+    image.push(
+        BEAUTY,
+        [
+            ("R", of(&|e| e.mean[0])),
+            ("G", of(&|e| e.mean[1])),
+            ("B", of(&|e| e.mean[2])),
+            ("A", of(&|e| e.alpha)),
+        ],
+    );
+    let features: Vec<Features> = if wants_features(scene) {
+        (0..count).map(|i| film.features(i)).collect()
+    } else {
+        Vec::new()
+    };
+    let per_feature = |f: &dyn Fn(&Features) -> f64| -> Vec<f32> {
+        features.iter().map(|x| f(x) as f32).collect()
+    };
+    let mut missing = Vec::new();
+    for aov in Aov::ALL.into_iter().filter(|a| scene.film.aovs.contains(a)) {
+        let name = aov.name();
+        match aov {
+            Aov::Depth => image.push(name, [("Z", per_feature(&|f| f.depth))]),
+            Aov::Albedo => image.push(
+                name,
+                [
+                    ("R", per_feature(&|f| f.albedo[0])),
+                    ("G", per_feature(&|f| f.albedo[1])),
+                    ("B", per_feature(&|f| f.albedo[2])),
+                ],
+            ),
+            Aov::Normal => image.push(
+                name,
+                [
+                    ("X", per_feature(&|f| f.normal[0])),
+                    ("Y", per_feature(&|f| f.normal[1])),
+                    ("Z", per_feature(&|f| f.normal[2])),
+                ],
+            ),
+            Aov::Samples => image.push(name, [("N", of(&|e| f64::from(e.samples)))]),
+            Aov::Variance if estimates.iter().all(|e| e.variance.is_none()) => missing.push(aov),
+            // A pixel that was interrupted before its variance could be known says so.
+            Aov::Variance => {
+                let lane = |k: usize| of(&|e| e.variance.map_or(f64::NAN, |v| v[k]));
+                image.push(name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
+            }
+        }
+    }
+    (image, missing)
+}
+
+/// True if a layer is asked for that only the first vertex of a path can tell.
+pub fn wants_features(scene: &Scene) -> bool {
+    let first = [Aov::Depth, Aov::Albedo, Aov::Normal];
+    scene.film.aovs.iter().any(|a| first.contains(a))
+}
+
+/// Writes the picture to all targets.
+pub fn write(a: &Render, image: &Image, targets: &[Target]) -> Outcome<()> {
+    let tone = ToneMap {
+        exposure: a.exposure as f32,
+        curve: match a.tone_map {
+            ToneCurve::Srgb => Curve::Srgb,
+            ToneCurve::Filmic => Curve::Filmic,
+        },
+    };
+    for t in targets {
+        match t.format {
+            Format::Exr => image.write_exr(&t.path),
+            Format::Png => image.write_png(&t.path, &tone),
+        }
+        .map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// The names of the targets, for messages.
+pub fn names(targets: &[Target]) -> String {
+    let names: Vec<_> = targets
+        .iter()
+        .map(|t| t.path.display().to_string())
+        .collect();
+    names.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn bytes_for_people() {
+        assert_eq!(super::bytes(999), "999 bytes");
+        assert_eq!(super::bytes(1475137), "1.5 MB");
+        assert_eq!(super::bytes(560_000_000_000), "560 GB");
+    }
+}

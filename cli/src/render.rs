@@ -1,0 +1,215 @@
+//! `resolvent render`.
+
+use crate::args::Render;
+use crate::console;
+use crate::failure::{Code, Failure, Outcome, failed, input};
+use crate::input::Kind;
+use crate::interrupt::{self, Phase};
+use crate::output::{self, Target};
+use crate::overrides::{self, Plan};
+use crate::progress::{self, Display};
+use crate::stats::{self, Seconds};
+use resolvent_api::{Affine, PluginKind};
+use resolvent_engine::plugin::{ForeignIntegrator, Message, Registry, set_log};
+use resolvent_engine::scene::Scene;
+use resolvent_engine::{Rendered, Settings, with_threads};
+use resolvent_scene as describe;
+use std::time::Instant;
+
+/// Runs the command.
+pub fn run(a: &Render) -> Outcome {
+    console::set_quiet(a.quiet);
+    interrupt::install();
+    set_log(|message| match message {
+        Message::Warning(text) => console::warning(text),
+        Message::Info(text) => console::info(text),
+    });
+    let kind = crate::input::kind(&a.input)?;
+    let targets = output::targets(a)?;
+    for file in a.stats.iter().chain(&a.save_scene) {
+        output::check_writable(file)?;
+    }
+    with_threads(a.threads.into(), || work(a, kind, &targets)).map_err(input)?
+}
+
+/// Everything that uses threads.
+fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
+    let start = Instant::now();
+    let mut seconds = Seconds::default();
+    let mut described = describe(a, kind)?;
+    let plan = overrides::apply(a, &mut described)?;
+    seconds.parse = start.elapsed().as_secs_f64();
+    let registry = Registry::new(&a.plugins.plugin_path);
+
+    let built = Scene::build(&described, &registry).map_err(input)?;
+    let instance = registry
+        .instantiate(
+            PluginKind::Integrator,
+            &described.integrator,
+            &described,
+            &Affine::IDENTITY,
+            built.lanes,
+        )
+        .map_err(input)?;
+    let integrator = ForeignIntegrator::new(instance).map_err(input)?;
+    if let Some(file) = &a.save_scene {
+        save_scene(&described, &registry, file)?;
+    }
+    seconds.build(&built.preparation);
+    let features = output::wants_features(&described);
+    output::check_memory(described.film.window(), features, described.film.aovs.len())?;
+
+    let rendered = render(&built, &integrator, &described, &plan);
+    interrupt::enter(Phase::Writing);
+    let (rendered, broken) = match rendered {
+        Ok(rendered) => (rendered, None),
+        Err(broken) => {
+            let error = failed(broken.error);
+            match broken.rendered {
+                Some(rendered) => (*rendered, Some(error)),
+                None => return Err(error),
+            }
+        }
+    };
+    seconds.render = rendered.seconds;
+    warn_about(&rendered, &integrator);
+    let interrupted = rendered.interrupted;
+    if interrupted && stats::total_samples(&rendered) == 0 {
+        return Err(failed(
+            "interrupted before any pixel was finished; nothing is saved",
+        ));
+    }
+    let write_start = Instant::now();
+    let (mut image, missing) = output::image(&described, &rendered);
+    for layer in missing {
+        console::warning(format!(
+            "the layer '{}' is left out: it takes more samples to know it",
+            layer.name()
+        ));
+    }
+    let error = rendered.film.relative_error();
+    let plain = rendered.samples;
+    image.metadata = stats::metadata(a, &described, &plan, &rendered, &integrator, error);
+    output::write(a, &image, targets)?;
+    seconds.write = write_start.elapsed().as_secs_f64();
+    seconds.total = start.elapsed().as_secs_f64();
+    if let Some(file) = &a.stats {
+        let run = stats::Run {
+            args: a,
+            described: &described,
+            registry: &registry,
+            scene: &built,
+            rendered: &rendered,
+            plan: &plan,
+            seconds,
+            error,
+        };
+        stats::write(&run, file)?;
+    }
+    let error = error.map_or_else(String::new, |e| {
+        format!(", estimated error {}", progress::percent(e))
+    });
+    let summary = format!(
+        "{} ({plain} spp{error}, {})",
+        output::names(targets),
+        progress::duration(rendered.seconds)
+    );
+    if let Some(Failure { code, message }) = broken {
+        return Err(Failure {
+            code,
+            message: format!("{message}; what was finished before is saved in {summary}"),
+        });
+    }
+    if interrupted {
+        // Said even if quiet: the picture is not the one that was asked for.
+        console::line(&format!(
+            "interrupted; what was finished is saved in {summary}"
+        ));
+        return Ok(Code::Interrupted);
+    }
+    console::info(format!("wrote {summary}"));
+    Ok(Code::Done)
+}
+
+/// The description of what to render.
+fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
+    match kind {
+        Kind::Scene => {
+            if let Some(option) = a.guesses.given() {
+                return Err(input(format!(
+                    "{option} is for VDB files; {} is a scene, which says this itself",
+                    a.input.display()
+                )));
+            }
+            describe::Scene::read(&a.input).map_err(input)
+        }
+        Kind::Vdb => Err(input("VDB")),
+        Kind::Exr => Err(input(format!(
+            "{}: is an image; render takes a scene (.json) or an OpenVDB file (.vdb)",
+            a.input.display()
+        ))),
+    }
+}
+
+fn save_scene(scene: &describe::Scene, registry: &Registry, file: &std::path::Path) -> Outcome<()> {
+    let decls: Vec<_> = registry.loaded().iter().map(|p| p.decl.clone()).collect();
+    let mut scene = scene.clone();
+    scene.rebase(file, &decls).map_err(failed)?;
+    let text = scene.to_text().map_err(input)?;
+    resolvent_image::write_atomically(file, |out| {
+        use std::io::Write;
+        out.write_all(text.as_bytes())
+            .map_err(|source| resolvent_image::Error::Io {
+                file: file.to_path_buf(),
+                what: "cannot write: ",
+                source,
+            })
+    })
+    .map_err(failed)?;
+    console::info(format!("wrote the scene to {}", file.display()));
+    Ok(())
+}
+
+fn render(
+    scene: &Scene,
+    integrator: &ForeignIntegrator,
+    described: &describe::Scene,
+    plan: &Plan,
+) -> Result<Rendered, Box<resolvent_engine::Broken>> {
+    let settings = Settings {
+        resolution: described.film.resolution,
+        window: described.film.window(),
+        samples: plan.samples.clone(),
+        goal: plan.goal,
+        seed: described.sampling.seed,
+        features: output::wants_features(described),
+    };
+    let display = Display::new(plan.goal);
+    interrupt::enter(Phase::Rendering);
+    let rendered = resolvent_engine::render(scene, integrator, &settings, &interrupt::STOP, &|p| {
+        display.report(p);
+    });
+    display.finish();
+    rendered
+}
+
+/// What may make the picture wrong.
+fn warn_about(rendered: &Rendered, integrator: &ForeignIntegrator) {
+    let c = &rendered.counters;
+    if c.violations > 0 {
+        console::warning(format!(
+            "the extinction was above its majorant at {} points: a fault of a medium plugin, and the picture may be wrong",
+            c.violations
+        ));
+    }
+    if c.rejected > 0 {
+        let at = rendered.rejected_at.map_or_else(String::new, |[x, y]| {
+            format!(", the first at pixel ({x}, {y})")
+        });
+        console::warning(format!(
+            "{} samples of the {} were not finite and count as black{at}",
+            c.rejected,
+            integrator.title()
+        ));
+    }
+}

@@ -1,0 +1,29 @@
+//! What the operating system says about memory.
+
+/// Largest memory this process has held, bytes; `None` where the system does not say.
+pub fn peak_memory() -> Option<u64> {
+    proc_kilobytes("/proc/self/status", "VmHWM:")
+}
+
+/// Memory that can be had without swapping, bytes; `None` where the system does not say.
+pub fn available_memory() -> Option<u64> {
+    proc_kilobytes("/proc/meminfo", "MemAvailable:")
+}
+
+fn proc_kilobytes(file: &str, key: &str) -> Option<u64> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let line = text.lines().find_map(|l| l.strip_prefix(key))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn linux_says_it() {
+        let peak = super::peak_memory().unwrap();
+        assert!((1 << 19..1 << 40).contains(&peak), "{peak}");
+        assert!(super::available_memory().unwrap() > 0);
+    }
+}
