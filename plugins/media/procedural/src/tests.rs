@@ -2,9 +2,10 @@
 
 use super::*;
 use resolvent_api::Affine;
+use resolvent_api::rng::Stream;
 use resolvent_tests::Suite;
 use resolvent_tests::host::{create, create_at};
-use resolvent_tests::medium::{March, check, draws, segment};
+use resolvent_tests::medium::{March, check, draws, edges, segment};
 
 fn skewed() -> Affine {
     Affine::from_rows([
@@ -148,6 +149,40 @@ fn bounds_are_tight() {
     );
     let past = segment(Vec3::new(-2.0, 0.99, 0.99), Vec3::new(0.0, 0.99, 0.99), 4.0);
     assert_eq!(m.sample(&past, &draws(1, 1, Spectrum::ONE)).lookups, 0);
+}
+
+/// Majorants hold whatever the parameters are, seen from anywhere.
+#[test]
+fn no_extinction_above_its_majorant() {
+    let mut stream = Stream::new(0xb0);
+    let mut suite = Suite::new();
+    for seed in 0..if cfg!(debug_assertions) { 3 } else { 40 } {
+        let mut u = || f64::from(stream.uniform());
+        let shape = if seed % 2 == 0 {
+            format!(r#""radius": {}"#, 0.01 + 100.0 * u())
+        } else {
+            format!(
+                r#""bounds": [-1, -2, 0, {}, {}, 50]"#,
+                20.0 * u(),
+                3.0 * u()
+            )
+        };
+        let params = format!(
+            r#"{{ {shape}, "seed": {seed}, "sigma_t": {}, "octaves": {}, "frequency": {}, "lacunarity": {},
+                 "gain": {}, "coverage": {}, "softness": {}, "falloff": {} }}"#,
+            10.0 * u(),
+            1 + (8.0 * u()) as u32,
+            0.2 + 9.0 * u(),
+            1.0 + 1.5 * u(),
+            u(),
+            0.4 + 0.6 * u(),
+            0.01 + 0.9 * u(),
+            u(),
+        );
+        let m: Procedural = create_at(&params, &skewed()).unwrap();
+        edges(&mut suite, &params, &m);
+    }
+    suite.assert();
 }
 
 #[test]
