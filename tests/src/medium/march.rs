@@ -134,7 +134,7 @@ impl March {
             .sum()
     }
 
-    /// The bin of `t`, of [`BINS`] over the range.
+    /// The bin of `t`, of 32 over the range.
     pub fn bin(&self, t: f64) -> usize {
         let (a, b) = self.range;
         (((t - a) / (b - a) * BINS as f64) as usize).min(BINS - 1)
