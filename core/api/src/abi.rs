@@ -421,6 +421,10 @@ pub struct SceneTable {
     pub lanes: u32,
     /// Zero.
     pub reserved: u32,
+    /// Unit direction towards the strongest distant light, or zero if there is none: what walks in media may be guided by.
+    pub sun: Float3,
+    /// Zero.
+    pub reserved_sun: u32,
     /// Passed back to the functions.
     pub ctx: *const c_void,
     /// Ray of a sample of `pixel` (column, row). `film` are two random numbers that the reconstruction filter turns into a

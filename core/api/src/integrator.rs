@@ -75,6 +75,12 @@ impl<'a> SceneView<'a> {
         self.table.lanes
     }
 
+    /// Unit direction towards the strongest distant light, if there is one.
+    pub fn sun(&self) -> Option<Vec3> {
+        let sun = Vec3::from(self.table.sun);
+        (sun != Vec3::ZERO).then_some(sun)
+    }
+
     /// The camera's ray for a sample of `pixel` (column, row), by two random numbers for the film and two for the lens.
     #[inline(always)]
     pub fn camera_ray(

@@ -20,6 +20,7 @@ enum Purpose {
     Scatter = 2,
     Light = 3,
     Connection = 4,
+    Branch = 5,
 }
 
 /// The numbers of one sample of one pixel.
@@ -47,6 +48,17 @@ impl Sampler {
             index: sample % BATCH,
             lanes,
             hero,
+        }
+    }
+
+    /// The numbers of a branch that leaves the path at a vertex: unrelated to those of the path.
+    #[inline(always)]
+    pub fn branch(&self, bounce: u32) -> Self {
+        let purpose = 0x6272_616e_6300_0000 + u64::from(bounce);
+        Self {
+            batch_key: derive(self.batch_key, purpose),
+            sample_key: derive(self.sample_key, purpose),
+            ..*self
         }
     }
 
@@ -115,6 +127,19 @@ impl Sampler {
                 dir: [a, b],
             },
             d,
+        )
+    }
+
+    /// Whether a branch leaves the path, and its direction.
+    #[inline(always)]
+    pub fn branching(&self, bounce: u32) -> (f32, ScatterDraws) {
+        let [a, b, c, d] = self.four(bounce, Purpose::Branch);
+        (
+            d,
+            ScatterDraws {
+                lobe: c,
+                dir: [a, b],
+            },
         )
     }
 

@@ -105,6 +105,25 @@ impl Lights {
         }
     }
 
+    /// Unit direction towards the strongest distant light, or zero.
+    pub fn sun(&self) -> Vec3 {
+        let strongest = self.all.iter().filter_map(|l| match l {
+            Light::Distant {
+                to_light,
+                irradiance,
+            } => Some((*to_light, irradiance.max_lane())),
+            Light::Disc {
+                frame,
+                radiance,
+                one_minus_cos,
+            } => Some((frame.n.into(), radiance.max_lane() * one_minus_cos)),
+            _ => None,
+        });
+        strongest
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(Vec3::ZERO, |(d, _)| d)
+    }
+
     /// True if some light is met by rays that leave the scene.
     pub fn has_environment(&self) -> bool {
         !self.infinite.is_empty()

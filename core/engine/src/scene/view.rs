@@ -119,6 +119,8 @@ impl<'s> View<'s> {
             traits: self.scene.traits,
             lanes: self.scene.lanes,
             reserved: 0,
+            sun: self.scene.lights.sun().into(),
+            reserved_sun: 0,
             ctx: std::ptr::from_ref(self).cast(),
             camera_ray,
             emerge,

@@ -1,4 +1,14 @@
-//! One path.
+//! One path, and the branches that look for the sun.
+//!
+//! With a peaked phase function and a sun, light that arrives after a scattering into the sun's direction is rare and strong: the
+//! value of the last phase function has the relative second moment (1+g²)/(1−g²)², 22 at g = 0.85. The remedy is in the spirit of
+//! VROOM (Buras & Mayer 2011): at a vertex of the walk a branch leaves with probability c in a direction sampled *around the
+//! sun* with density q_L; it goes on like the walk, but never branches itself. A given path can come about by the walk alone, or by
+//! a branch at any of its vertices; the balance heuristic over all of these gives every path, whichever way it came about, the weight
+//!
+//!   1 / (1 + S),   S = Σ over vertices k of c q_L(ω_k) / q(ω_k)
+//!
+//! where q is the walk's own density. So S is carried along, and nothing else changes: walk and branches have one kernel.
 
 use resolvent_api::abi::{PixelSample, scene_traits};
 use resolvent_api::integrator::Outcome;
@@ -17,9 +27,14 @@ pub struct Kernel<'a> {
     pub max_depth: u32,
     /// Keep only light scattered exactly this often.
     pub order: Option<u32>,
+    /// Direction towards the sun, if walks branch.
+    pub sun: Option<Vec3>,
+    /// Probability c of a branch.
+    pub branching: f32,
 }
 
 /// How the direction to the next vertex was found, for the weight of light met there.
+#[derive(Clone, Copy)]
 enum Found {
     /// By the camera or a delta lobe: no connection could have found it.
     Alone,
@@ -27,93 +42,201 @@ enum Found {
     With(f32),
 }
 
+/// The state of a walk between two vertices.
+#[derive(Clone, Copy)]
+struct Walk {
+    /// Contribution and density.
+    beta: Throughput,
+    /// S: density of the ways through branches, relative to the walk's.
+    others: f32,
+    /// How the current direction was found.
+    found: Found,
+    /// Scattering events so far.
+    depth: u32,
+    /// Density of the current direction around the sun relative to isotropic, at least 1: what the light still to come
+    /// is expected to be worth.
+    promise: f32,
+}
+
 impl Kernel<'_> {
-    /// Traces the path of one sample of the pixel at `pixel`.
+    /// Traces the path of one sample of a pixel.
     pub fn path<const CHROMATIC: bool>(
         &self,
         sampler: &Sampler,
         pixel: [u32; 2],
         features: bool,
     ) -> Outcome<PixelSample> {
-        let scene = self.scene;
-        let lanes = scene.lanes();
         let mut out = PixelSample::default();
         let (film, lens) = sampler.camera();
-        let Some(ray) = scene.camera_ray(pixel, film, lens)? else {
+        let Some(ray) = self.scene.camera_ray(pixel, film, lens)? else {
             return Ok(out);
         };
-
-        let mut beta = Throughput::ONE;
-        beta.f *= ray.weight;
+        let mut walk = Walk {
+            beta: Throughput::ONE,
+            others: 0.0,
+            found: Found::Alone,
+            depth: 0,
+            promise: 1.0,
+        };
+        walk.beta.f *= ray.weight;
         let (mut first, mut second) = (Vertex::empty(), Vertex::empty());
         // Vertices are large: they change roles, not places.
-        let (mut here, mut next) = (&mut first, &mut second);
+        let (here, next) = (&mut first, &mut second);
         let mut edge = Edge::default();
-        let mut found = Found::Alone;
-        let mut alive = scene.emerge(&ray, &sampler.flight(0, beta.p), &mut edge, next)?;
+        let flight = sampler.flight(0, walk.beta.p);
+        let alive = self.scene.emerge(&ray, &flight, &mut edge, next)?;
+        if alive && !next.is(VertexKind::Emitter) {
+            out.alpha = 1.0;
+            if features {
+                describe(&mut out, next, edge.length);
+            }
+        }
+        out.radiance = if self.sun.is_some() {
+            self.follow::<CHROMATIC, true>(walk, sampler, alive, &mut edge, here, next)?
+        } else {
+            self.follow::<CHROMATIC, false>(walk, sampler, alive, &mut edge, here, next)?
+        };
+        Ok(out)
+    }
+
+    /// Follows a walk from the edge it is on to its end; the light it finds.
+    fn follow<'v, const CHROMATIC: bool, const BRANCHES: bool>(
+        &self,
+        mut walk: Walk,
+        sampler: &Sampler,
+        mut alive: bool,
+        edge: &mut Edge,
+        mut here: &'v mut Vertex,
+        mut next: &'v mut Vertex,
+    ) -> Outcome<Spectrum> {
+        let scene = self.scene;
+        let lanes = scene.lanes();
         let connects = scene.has(scene_traits::LIGHTS);
         let emissive = scene.has(scene_traits::EMISSIVE_MEDIA);
-
-        for depth in 0.. {
-            if emissive && self.keeps(depth) {
-                out.radiance += beta.f * edge.emitted;
+        let mut light = Spectrum::ZERO;
+        loop {
+            let share = 1.0 / (1.0 + walk.others);
+            if emissive && self.keeps(walk.depth) {
+                light += walk.beta.f * edge.emitted * share;
             }
             if !alive {
                 break;
             }
             let medium = next.is(VertexKind::Medium);
-            if !medium && next.flags & vertex_flags::EMITS != 0 && self.keeps(depth) {
-                let other = match found {
+            if !medium && next.flags & vertex_flags::EMITS != 0 && self.keeps(walk.depth) {
+                let other = match walk.found {
                     Found::With(density) if connects => scene.light_density(here, next) / density,
                     _ => 0.0,
                 };
-                out.radiance += beta.found::<CHROMATIC>(&edge, other, lanes) * next.emitted;
+                let found = walk.beta.found::<CHROMATIC>(edge, other, lanes);
+                light += found * next.emitted * share;
             }
             if next.is(VertexKind::Emitter) {
                 break;
             }
-            if depth == 0 {
-                out.alpha = 1.0;
-                if features {
-                    describe(&mut out, next, edge.length);
-                }
-            }
-            beta.travel::<CHROMATIC>(&edge);
-            if depth >= self.max_depth {
+            walk.beta.travel::<CHROMATIC>(edge);
+            if walk.depth >= self.max_depth {
                 break;
             }
             std::mem::swap(&mut here, &mut next);
             if medium {
-                beta.collide::<CHROMATIC>(here.sigma_t, here.sigma_s, lanes);
-                if beta.f.is_zero() {
+                walk.beta
+                    .collide::<CHROMATIC>(here.sigma_t, here.sigma_s, lanes);
+                if walk.beta.f.is_zero() {
                     break;
                 }
             }
-            if connects && self.keeps(depth + 1) {
-                out.radiance += self.connect::<CHROMATIC>(here, &beta, sampler, depth)?;
+            if connects && self.keeps(walk.depth + 1) {
+                light += self.connect::<CHROMATIC>(here, &walk.beta, sampler, walk.depth)? * share;
             }
-
-            let (draws, chance) = sampler.scatter(depth);
+            if BRANCHES && medium {
+                light += self.branch::<CHROMATIC>(here, &walk, sampler)?;
+            }
+            let (draws, chance) = sampler.scatter(walk.depth);
             let Some(s) = scatter::sample(scene, here, draws, Mode::Radiance)? else {
                 break;
             };
-            beta.f *= s.weight;
-            let q = roulette::survival(beta.weight::<CHROMATIC>(lanes).max_lane());
-            if q < 1.0 {
-                if chance >= q {
-                    break;
-                }
-                beta.f *= 1.0 / q;
-            }
-            found = if scatter::is_delta(&s) {
+            walk.beta.f *= s.weight;
+            let wi = Vec3::from(s.wi);
+            walk.found = if scatter::is_delta(&s) {
                 Found::Alone
             } else {
                 Found::With(s.forward)
             };
-            let flight = sampler.flight(depth + 1, beta.p);
-            alive = scene.propagate(here, Vec3::from(s.wi), &flight, &mut edge, next)?;
+            if let Some(sun) = self.sun {
+                self.turn(&mut walk, here, wi, sun, s.forward, medium)?;
+            }
+            if !survives::<CHROMATIC>(&mut walk, chance, lanes) {
+                break;
+            }
+            walk.depth += 1;
+            let flight = sampler.flight(walk.depth, walk.beta.p);
+            alive = scene.propagate(here, wi, &flight, edge, next)?;
         }
-        Ok(out)
+        Ok(light)
+    }
+
+    /// Accounts for a new direction `wi`, chosen with density `q` at `here`: its share of the ways through branches, and
+    /// what it promises.
+    #[inline(always)]
+    fn turn(
+        &self,
+        walk: &mut Walk,
+        here: &Vertex,
+        wi: Vec3,
+        sun: Vec3,
+        q: f32,
+        medium: bool,
+    ) -> Outcome<()> {
+        if !medium {
+            walk.promise = 1.0;
+            return Ok(());
+        }
+        let around = around_sun(self.scene, here, sun, wi)?;
+        walk.others += self.branching * around / q;
+        walk.promise = (around * 4.0 * core::f32::consts::PI).max(1.0);
+        Ok(())
+    }
+
+    /// Perhaps sends a branch from `here` towards the sun; the light it finds.
+    #[inline(always)]
+    fn branch<const CHROMATIC: bool>(
+        &self,
+        here: &Vertex,
+        walk: &Walk,
+        sampler: &Sampler,
+    ) -> Outcome<Spectrum> {
+        let Some(sun) = self.sun else {
+            return Ok(Spectrum::ZERO);
+        };
+        let (chance, draws) = sampler.branching(walk.depth);
+        if chance >= self.branching {
+            return Ok(Spectrum::ZERO);
+        }
+        let scene = self.scene;
+        let Some(s) = here.scatter.sample(-sun, draws, Mode::Radiance) else {
+            return Ok(Spectrum::ZERO);
+        };
+        let wi = Vec3::from(s.wi);
+        let e = scatter::eval(scene, here, wi, Mode::Radiance)?;
+        if !(e.forward > 0.0) {
+            return Ok(Spectrum::ZERO);
+        }
+        let mut walk = *walk;
+        walk.beta.f *= e.f * (1.0 / e.forward);
+        walk.found = Found::With(e.forward);
+        self.turn(&mut walk, here, wi, sun, e.forward, true)?;
+        let sampler = sampler.branch(walk.depth);
+        let (_, chance) = sampler.scatter(walk.depth);
+        if !survives::<CHROMATIC>(&mut walk, chance, scene.lanes()) {
+            return Ok(Spectrum::ZERO);
+        }
+        walk.depth += 1;
+        let (mut first, mut second) = (*here, Vertex::empty());
+        let mut edge = Edge::default();
+        let flight = sampler.flight(walk.depth, walk.beta.p);
+        let alive = scene.propagate(here, wi, &flight, &mut edge, &mut second)?;
+        self.follow::<CHROMATIC, false>(walk, &sampler, alive, &mut edge, &mut first, &mut second)
     }
 
     /// True if light scattered `order` times is wanted.
@@ -163,6 +286,29 @@ impl Kernel<'_> {
         let found = beta.connected::<CHROMATIC>(&edge, light.density, other, scene.lanes());
         Ok(found * weight * light.radiance)
     }
+}
+
+/// Density of a direction under the phase function of `here` turned towards the sun.
+#[inline(always)]
+fn around_sun(scene: &SceneView<'_>, here: &Vertex, sun: Vec3, wi: Vec3) -> Outcome<f32> {
+    match here.scatter.try_eval(-sun, wi, Mode::Radiance) {
+        Ok(e) => Ok(e.forward),
+        Err(_) => Err(scene.fault(here, "panicked in eval")),
+    }
+}
+
+/// Plays roulette with what the walk is worth: its weight times what its direction promises.
+#[inline(always)]
+fn survives<const CHROMATIC: bool>(walk: &mut Walk, chance: f32, lanes: u32) -> bool {
+    let weight = walk.beta.weight::<CHROMATIC>(lanes).max_lane() / (1.0 + walk.others);
+    let q = roulette::survival(weight * walk.promise);
+    if q < 1.0 {
+        if chance >= q {
+            return false;
+        }
+        walk.beta.f *= 1.0 / q;
+    }
+    true
 }
 
 /// Depth, albedo and normal of the first vertex.

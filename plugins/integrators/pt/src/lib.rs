@@ -7,6 +7,7 @@
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events after which a path ends, −1: none. A limit makes the picture darker than it should be |
+//! | `branching` | float 0…1 | 0.25 | probability of a branch towards the sun at a vertex in a medium; the picture's mean does not depend on it |
 //! | `orders` | int ≥ −1 | −1 | only light scattered exactly this often is kept, −1: all |
 //!
 //! ```json
@@ -16,7 +17,7 @@
 mod kernel;
 
 use kernel::Kernel;
-use resolvent_api::abi::{ParamDecl, PixelSample, Tile};
+use resolvent_api::abi::{ParamDecl, PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
 use resolvent_pathspace::sampler::Sampler;
@@ -25,6 +26,7 @@ use resolvent_pathspace::sampler::Sampler;
 struct PathTracer {
     max_depth: u32,
     order: Option<u32>,
+    branching: f32,
 }
 
 impl Plugin for PathTracer {
@@ -45,6 +47,14 @@ impl Plugin for PathTracer {
         .default("-1")
         .at_least(-1.0)
         .build(),
+        Decl::float(
+            "branching",
+            "probability of a branch towards the sun at a vertex in a medium; 0: never",
+        )
+        .default("0.25")
+        .at_least(0.0)
+        .at_most(1.0)
+        .build(),
     ];
 
     fn create(params: &Params<'_>) -> Result<Self, Error> {
@@ -54,16 +64,22 @@ impl Plugin for PathTracer {
         Ok(Self {
             max_depth: limit.min(order.unwrap_or(u32::MAX)),
             order,
+            branching: params.float("branching")? as f32,
         })
     }
 }
 
 impl Integrator for PathTracer {
     fn render(&self, scene: &SceneView<'_>, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
+        let sun = scene
+            .sun()
+            .filter(|_| self.branching > 0.0 && scene.has(scene_traits::MEDIA));
         let kernel = Kernel {
             scene,
             max_depth: self.max_depth,
             order: self.order,
+            sun,
+            branching: self.branching,
         };
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
         if scene.is_grey() {
