@@ -26,7 +26,8 @@
 //! the range of every layer of noise is known exactly, so tracking never meets an extinction above its majorant.
 //!
 //! **height_fog**: σ_t(h) = `sigma_t` · exp(−(h − `height`)/`scale_height`). Flights and transmittances are exact, in closed form.
-//! Without an extent the fog reaches to the horizon and begins at `height`: there is nothing below.
+//! Without an extent the fog fills the mesh whose interior it is, or reaches to the horizon where the host lets free media do
+//! so; it then begins at `height`, and there is nothing below.
 //!
 //! ```json
 //! "media": {
@@ -34,7 +35,8 @@
 //!     "sigma_t": 20, "radius": 2, "phase": { "plugin": "hg", "params": { "g": 0.85 } }
 //!   } },
 //!   "fog": { "plugin": "procedural", "params": {
-//!     "kind": "height_fog", "sigma_t": 0.1, "scale_height": 3, "albedo": 0.95
+//!     "kind": "height_fog", "sigma_t": 0.1, "scale_height": 3, "albedo": 0.95,
+//!     "bounds": [-500, 0, -500, 500, 20, 500]
 //!   } }
 //! }
 //! ```
