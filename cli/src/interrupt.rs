@@ -26,11 +26,6 @@ pub fn enter(phase: Phase) {
     PHASE.store(phase as u8, Ordering::SeqCst);
 }
 
-/// True if an interruption was asked for.
-pub fn asked() -> bool {
-    STOP.load(Ordering::SeqCst)
-}
-
 /// Handles interruptions from now on.
 pub fn install() {
     let handler = || {

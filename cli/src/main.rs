@@ -7,6 +7,7 @@ mod args;
 mod compare;
 mod console;
 mod failure;
+mod guess;
 mod info;
 mod input;
 mod interrupt;

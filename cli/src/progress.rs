@@ -16,6 +16,8 @@ const LINE_INTERVAL: u64 = 5000;
 /// Shows progress.
 pub struct Display {
     goal: Goal,
+    /// Samples per pixel to be taken.
+    samples: u32,
     bar: Option<ProgressBar>,
     /// When to show something next, milliseconds since the start.
     next: AtomicU64,
@@ -23,7 +25,7 @@ pub struct Display {
 
 impl Display {
     /// Shows a bar if standard error is a terminal, lines otherwise, nothing if quiet.
-    pub fn new(goal: Goal) -> Self {
+    pub fn new(goal: Goal, samples: u32) -> Self {
         let bar = (std::io::stderr().is_terminal() && !console::is_quiet()).then(|| {
             let bar = ProgressBar::new(STEPS);
             if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}") {
@@ -35,6 +37,7 @@ impl Display {
         let next = if bar.is_some() { 0 } else { LINE_INTERVAL };
         Self {
             goal,
+            samples,
             bar,
             next: AtomicU64::new(next),
         }
@@ -61,7 +64,13 @@ impl Display {
             return;
         }
         let done = self.done(&p);
-        let text = describe(&p, remaining(done, p.elapsed.as_secs_f64()));
+        let samples = match self.goal {
+            // Passes are long: what is taken of the one in progress counts too.
+            Goal::Samples => (p.done * f64::from(self.samples)) as u32,
+            _ => p.samples,
+        };
+        let left = remaining(done, p.elapsed.as_secs_f64());
+        let text = describe(samples, p.error, left);
         match &self.bar {
             Some(bar) => {
                 bar.set_position((done * STEPS as f64) as u64);
@@ -93,9 +102,9 @@ fn remaining(done: f64, elapsed: f64) -> Option<f64> {
     (done > 0.002).then(|| elapsed * (1.0 - done) / done)
 }
 
-fn describe(p: &Progress, left: Option<f64>) -> String {
-    let mut text = format!("{} spp", p.samples);
-    if let Some(e) = p.error {
+fn describe(samples: u32, error: Option<f64>, left: Option<f64>) -> String {
+    let mut text = format!("{samples} spp");
+    if let Some(e) = error {
         text += &format!(", error {}", percent(e));
     }
     if let Some(left) = left {

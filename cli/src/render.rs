@@ -143,7 +143,7 @@ fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
             }
             describe::Scene::read(&a.input).map_err(input)
         }
-        Kind::Vdb => Err(input("VDB")),
+        Kind::Vdb => crate::guess::scene(&a.input, a),
         Kind::Exr => Err(input(format!(
             "{}: is an image; render takes a scene (.json) or an OpenVDB file (.vdb)",
             a.input.display()
@@ -184,7 +184,7 @@ fn render(
         seed: described.sampling.seed,
         features: output::wants_features(described),
     };
-    let display = Display::new(plan.goal);
+    let display = Display::new(plan.goal, plan.samples.len() as u32);
     interrupt::enter(Phase::Rendering);
     let rendered = resolvent_engine::render(scene, integrator, &settings, &interrupt::STOP, &|p| {
         display.report(p);

@@ -29,6 +29,8 @@ pub struct Measures {
     pub max: f64,
     /// Box of the active voxels, world.
     pub bounds: [[f64; 3]; 2],
+    /// Points whose convex hull is about that of what is not nearly empty, world.
+    pub outline: Vec<[f64; 3]>,
 }
 
 /// True if a grid holds one real number per voxel.
@@ -114,7 +116,7 @@ pub fn measure(file: &File, info: &GridInfo) -> Result<Option<Measures>> {
     let (Some(transform), Some(active)) = (&info.transform, topology.active_bbox()) else {
         return Ok(None);
     };
-    let mass = mass(file, info, &topology)?;
+    let (mass, leaves) = mass(file, info, &topology)?;
     if mass.sum <= 0.0 {
         return Ok(None);
     }
@@ -127,10 +129,12 @@ pub fn measure(file: &File, info: &GridInfo) -> Result<Option<Measures>> {
         mean: mass.sum / topology.active_voxels().max(1) as f64,
         max: mass.max,
         bounds: world_box(transform, active),
+        outline: outline(transform, &topology, &leaves, mass.max),
     }))
 }
 
-fn mass(file: &File, info: &GridInfo, topology: &Topology) -> Result<Mass> {
+/// The mass of the grid, and that of each leaf.
+fn mass(file: &File, info: &GridInfo, topology: &Topology) -> Result<(Mass, Vec<Mass>)> {
     // One slot per leaf, added up in order: the sums do not depend on the threads.
     let mut slots = vec![Mass::default(); topology.leaves().len()];
     file.read_leaves_into(
@@ -155,7 +159,49 @@ fn mass(file: &File, info: &GridInfo, topology: &Topology) -> Result<Mass> {
         let at = t.origin.map(|o| f64::from(o) + 0.5 * (side - 1.0));
         all.add(t.value.to_f64()[0], at, side.powi(3));
     }
-    Ok(all)
+    Ok((all, slots))
+}
+
+/// Values below this share of the largest are a veil that a picture need not hold.
+const VEIL: f64 = 0.02;
+/// Directions in which the outline is searched.
+const DIRECTIONS: usize = 256;
+
+/// The farthest points of leaves and tiles in many directions: the vertices of a polytope inside the convex hull.
+fn outline(transform: &Transform, topology: &Topology, masses: &[Mass], max: f64) -> Vec<[f64; 3]> {
+    let leaves = topology.leaves().iter().zip(masses);
+    let leaves = leaves
+        .filter(|(_, m)| m.max > VEIL * max)
+        .filter_map(|(l, _)| l.active_bbox());
+    let tiles = topology
+        .tiles()
+        .filter(|t| t.active && t.value.to_f64()[0] > VEIL * max)
+        .map(|t| {
+            [
+                t.origin,
+                t.origin.map(|o| o.saturating_add(t.dim as i32 - 1)),
+            ]
+        });
+    let directions: Vec<[f64; 3]> = (0..DIRECTIONS).map(spread).collect();
+    let mut best = vec![(f64::NEG_INFINITY, [0.0; 3]); DIRECTIONS];
+    for corner in leaves.chain(tiles).flat_map(corners) {
+        let p = transform.to_world(corner);
+        for (d, best) in directions.iter().zip(&mut best) {
+            let reach = d[0] * p[0] + d[1] * p[1] + d[2] * p[2];
+            if reach > best.0 {
+                *best = (reach, p);
+            }
+        }
+    }
+    best.into_iter().map(|(_, p)| p).collect()
+}
+
+/// Direction `i` of a Fibonacci lattice on the sphere.
+fn spread(i: usize) -> [f64; 3] {
+    let z = 1.0 - (2.0 * i as f64 + 1.0) / DIRECTIONS as f64;
+    let angle = i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let r = (1.0 - z * z).sqrt();
+    [r * angle.cos(), r * angle.sin(), z]
 }
 
 /// Three lines through a point, as samples in index coordinates.

@@ -5,6 +5,7 @@ mod scene;
 mod vdb;
 
 pub use scene::named_files;
+pub use vdb::short;
 
 use crate::args::Info;
 use crate::failure::{Code, Outcome};
