@@ -93,6 +93,7 @@ unsafe extern "C" fn create<T: Plugin>(args: *const CreateArgs) -> *mut c_void {
     // SAFETY: the host passes valid arguments for the duration of the call.
     let args = unsafe { &*args };
     HOST.store(args.host.cast_mut(), Ordering::Relaxed);
+    NAME.get_or_init(|| T::NAME);
     // SAFETY: as above; the host's table outlives the instance.
     let (params, host) = unsafe { (Params::new(args), Host::new(args.host)) };
     match catch_unwind(AssertUnwindSafe(|| T::create(&params))) {
@@ -130,10 +131,14 @@ unsafe fn instance<'a, T>(p: *const c_void) -> &'a Instance<T> {
 /// by one program, so one place is enough.
 static HOST: AtomicPtr<HostTable> = AtomicPtr::new(core::ptr::null_mut());
 
+/// The plugin's name, for the same.
+static NAME: std::sync::OnceLock<&'static str> = std::sync::OnceLock::new();
+
 /// Reports a panic in a closure.
 #[cold]
 fn closure_panicked(payload: Box<dyn std::any::Any + Send>) -> Status {
-    let text = panic_text(payload);
+    let name = NAME.get().copied().unwrap_or_default();
+    let text = format!("a closure of '{name}' {}", panic_text(payload));
     let table = HOST.load(Ordering::Relaxed);
     if !table.is_null() {
         // SAFETY: the table came with `create` and lives as long as the process.

@@ -138,7 +138,7 @@ impl Registry {
         let plugin = self.open(path)?;
         if plugin.kind != kind {
             return Err(Error::Plugin(format!(
-                "{}: is a {} plugin where a {} plugin is needed",
+                "{}: is a plugin of the kind {} where one of the kind {} is needed",
                 path.display(),
                 plugin.kind.name(),
                 kind.name()

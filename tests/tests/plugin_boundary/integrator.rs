@@ -1,0 +1,82 @@
+//! Integrators that break the rules.
+
+use crate::build;
+use crate::drive::{blames, fault, picture, registry, says, walk};
+
+#[test]
+fn without_a_mode_it_renders() {
+    let p = picture(&walk("none"), &registry(), 32).unwrap_or_else(|f| panic!("{}", f.text));
+    assert!(p.pixels.iter().flatten().all(|v| *v == 1.0));
+}
+
+#[test]
+fn broken() {
+    let library = build::unruly("integrator");
+    for (mode, words) in [
+        (
+            "create panics",
+            &["$.integrator", "panicked at ", "unruly as asked: create"][..],
+        ),
+        ("create fails", &["$.integrator", "the path is overgrown"]),
+        (
+            "render panics",
+            &["panicked at ", "unruly as asked: render"],
+        ),
+        ("fails without a word", &["failed without saying why"]),
+        ("fails with a reason", &["the thread is lost"]),
+        ("adds beyond its tile", &["which is not in its tile"]),
+        ("adds far away", &["which is not in its tile"]),
+        ("splats", &["splats light"]),
+    ] {
+        let f = fault(&walk(mode));
+        blames(&f.text, "integrator", &library, words);
+        assert!(f.kept.is_none());
+    }
+}
+
+/// What was finished before stays.
+#[test]
+fn earlier_passes_are_kept() {
+    let f = fault(&walk("a later pass panics"));
+    blames(
+        &f.text,
+        "integrator",
+        &build::unruly("integrator"),
+        &["unruly as asked: later"],
+    );
+    let kept = f.kept.unwrap_or_else(|| panic!("nothing was kept"));
+    assert!(kept.samples > 0 && kept.samples < 32, "{}", kept.samples);
+    assert!(kept.pixels.iter().flatten().all(|v| *v == 1.0));
+}
+
+/// Samples that are not finite, or beyond what the film can hold, count as black and are reported.
+#[test]
+fn samples_that_are_not_finite() {
+    for mode in [
+        "radiance is NaN",
+        "radiance is infinite",
+        "radiance is enormous",
+        "alpha is NaN",
+    ] {
+        let p = picture(&walk(mode), &registry(), 32).unwrap_or_else(|f| panic!("{}", f.text));
+        // Every other sample of all pixels.
+        assert_eq!(p.counters.rejected, 16 * p.pixels.len() as u64, "{mode}");
+        assert_eq!(p.rejected_at, Some([0, 0]));
+        assert!(p.pixels.iter().flatten().all(|v| *v == 0.5), "{mode}");
+    }
+}
+
+/// A medium is no integrator.
+#[test]
+fn of_another_kind() {
+    let mut s = walk("none");
+    s["integrator"]["plugin"] = build::unruly("medium").display().to_string().into();
+    let f = fault(&s);
+    says(
+        &f.text,
+        &[
+            "$.integrator",
+            "is a plugin of the kind medium where one of the kind integrator is needed",
+        ],
+    );
+}
