@@ -90,8 +90,7 @@ fn ends_of_the_range() {
     assert_eq!(leaks(icosphere(3), |p| p * 9e17, near_center), 0);
 }
 
-/// Origins close to large triangles, whose vertices are a thousand times farther than the hit and partly behind the origin:
-/// what the padding of boxes is for.
+/// Origins close to large triangles, whose vertices are far beyond the hit and partly behind the origin.
 #[test]
 fn close_to_large_triangles() {
     let corners = |s: f32| {
@@ -160,6 +159,61 @@ fn close_to_large_triangles() {
         assert!(accel.closest(&ray).is_some(), "{ray:?}");
         assert!(accel.occluded(&ray), "{ray:?}");
     }
+}
+
+/// A floor of large triangles with edges along the axes, where boxes end exactly at edges, seen from close above: rounding moves
+/// the vertices by more than the hit's distance explains, which is what boxes are padded for.
+#[test]
+fn edges_at_the_faces_of_boxes() {
+    let mut random = Uniform(9);
+    let mut leaks = 0;
+    for turn in 0..12 {
+        let roll = |p: Vec3| match turn % 3 {
+            0 => p,
+            1 => vec3(p.z, p.x, p.y),
+            _ => vec3(p.y, p.z, p.x),
+        };
+        let (n, size) = (4, 10f32.powi(turn / 3 + 1));
+        let middle = random.vector();
+        let mut mesh = TriangleMesh::default();
+        for j in 0..=n {
+            for i in 0..=n {
+                let at = vec3(i as f32 - 2.0, j as f32 - 2.0, 0.0) * size;
+                mesh.positions.push(roll(middle + at));
+            }
+        }
+        let at = |i: u32, j: u32| j * (n + 1) + i;
+        for j in 0..n {
+            for i in 0..n {
+                mesh.indices
+                    .push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                mesh.indices
+                    .push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        let accel = Accel::build(Geometry {
+            shapes: vec![Shape::Mesh(mesh)],
+        })
+        .unwrap()
+        .unwrap();
+        for _ in 0..rays_in_test(200_000) {
+            // Next to the edges through the middle, within what rounding moves them by, from a height of a millionth to a
+            // hundredth of the triangles' size.
+            let across = usize::from(random.next() < 0.5);
+            let mut target = middle;
+            target[1 - across] += random.signed();
+            target[across] += random.signed() * size * 10f32.powf(-9.0 + 4.0 * random.next());
+            let height = size * 10f32.powf(-6.0 + 4.0 * random.next());
+            let o = target + vec3(random.signed(), random.signed(), random.next()) * height;
+            let ray = Ray::new(roll(o), roll(target - o));
+            // Only a ray that comes down counts: it cannot miss the plane.
+            if o.z > target.z {
+                leaks += usize::from(accel.closest(&ray).is_none());
+                leaks += usize::from(!accel.occluded(&ray));
+            }
+        }
+    }
+    assert_eq!(leaks, 0);
 }
 
 /// Two quads' halves and a T-shaped crack closed by a triangle whose vertices are on a line.

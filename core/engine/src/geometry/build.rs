@@ -91,6 +91,11 @@ fn distinct([a, b, c]: &[[f32; 3]; 3]) -> bool {
 
 /// The hierarchy over `primitives`; `None` if there are none.
 pub(super) fn build(primitives: &[Primitive]) -> Option<Tree> {
+    build_to(primitives, MAX_COST_DEPTH)
+}
+
+/// [`build`] with cost deciding down to a depth of `cost_depth`.
+fn build_to(primitives: &[Primitive], cost_depth: usize) -> Option<Tree> {
     if primitives.is_empty() {
         return None;
     }
@@ -100,6 +105,7 @@ pub(super) fn build(primitives: &[Primitive]) -> Option<Tree> {
         primitives,
         binary: &binary,
         plan: &plan,
+        cost_depth,
         tree: Tree {
             nodes: Vec::with_capacity(primitives.len() / 6 + 1),
             packets: Vec::with_capacity(primitives.len() / 3 + 1),
@@ -156,6 +162,7 @@ struct Layout<'a> {
     primitives: &'a [Primitive],
     binary: &'a Bvh2,
     plan: &'a Plan,
+    cost_depth: usize,
     tree: Tree,
 }
 
@@ -172,7 +179,7 @@ impl Layout<'_> {
                     let prims = self.plan.subtree(self.binary, n);
                     self.leaf(&prims)
                 }
-                Step::Inner(n) if depth < MAX_COST_DEPTH => {
+                Step::Inner(n) if depth < self.cost_depth => {
                     let steps = self.plan.children(self.binary, n);
                     self.node(&steps, depth + 1)
                 }
@@ -234,5 +241,108 @@ impl Layout<'_> {
             Child::leaf(false, packets, self.tree.packets.len() - packets)
         };
         (child, bounds)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::super::input::{Quad, Shape, Sphere};
+    use super::super::portable::Portable;
+    use super::super::ray::{Ray, RaySetup};
+    use super::super::traverse::closest;
+    use super::*;
+
+    /// Subtrees split by count give the same hits as those split by cost, and keep the depth within bounds.
+    #[test]
+    fn splitting_by_count() {
+        let mut state = 1u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let mut vector = || vec3(random(), random(), random());
+        let mut shapes = Vec::new();
+        for i in 0..3000 {
+            let (corner, edge_u, edge_v) = (vector(), vector() * 0.1, vector() * 0.1);
+            shapes.push(if i % 3 == 0 {
+                Shape::Sphere(Sphere {
+                    center: corner,
+                    radius: 0.03,
+                })
+            } else {
+                Shape::Quad(Quad {
+                    corner,
+                    edge_u,
+                    edge_v,
+                })
+            });
+        }
+        let (primitives, _) = primitives(&Geometry { shapes });
+        let by_cost = build(&primitives).unwrap();
+        for cost_depth in 1..4 {
+            let by_count = build_to(&primitives, cost_depth).unwrap();
+            assert!(by_count.depth <= cost_depth + 6, "{}", by_count.depth);
+            let mut hits = 0;
+            for _ in 0..2000 {
+                let o: Vec3 = vector() * 2.0;
+                let ray = RaySetup::new(&Ray::new(o, vector() - o)).unwrap();
+                let expected = closest(Portable, &by_cost, &ray, |_| true);
+                assert_eq!(closest(Portable, &by_count, &ray, |_| true), expected);
+                hits += usize::from(expected.is_some());
+            }
+            assert!(hits > 500);
+        }
+    }
+
+    /// A tree as deep as can be is traversed with the larger stack.
+    #[test]
+    fn deep_trees() {
+        let corner = vec3(-1.0, -1.0, 0.0);
+        let quad = |z: f32| {
+            Shape::Quad(Quad {
+                corner: corner + Vec3::Z * z,
+                edge_u: Vec3::X * 2.0,
+                edge_v: Vec3::Y * 2.0,
+            })
+        };
+        let (primitives, _) = primitives(&Geometry {
+            shapes: (0..8).map(|i| quad(-(i as f32))).collect(),
+        });
+        let mut tree = build(&primitives).unwrap();
+        let root = tree.nodes[0].clone();
+        // A chain: every node holds the original root's lanes but the last, and the next node.
+        let whole = primitives.iter().fold(Bounds::EMPTY, |mut b, p| {
+            b.include(&p.bounds);
+            b
+        });
+        tree.nodes.clear();
+        for i in 1..MAX_DEPTH {
+            let mut node = root.clone();
+            node.set(7, &whole, Child::node(i));
+            for lane in 0..7 {
+                node.set(lane, &whole, root.child[0]);
+            }
+            tree.nodes.push(node);
+        }
+        tree.nodes.push(root);
+        tree.depth = MAX_DEPTH;
+        let ray = RaySetup::new(&Ray::new(vec3(0.1, 0.2, 3.0), -Vec3::Z)).unwrap();
+        let hit = closest(Portable, &tree, &ray, |_| true).unwrap();
+        assert!((hit.t - 3.0).abs() < 1e-6 && hit.prim / 2 == 0, "{hit:?}");
+        assert!(closest(Portable, &tree, &ray, |_| false).is_none());
+        assert!(super::super::traverse::occluded(
+            Portable,
+            &tree,
+            &ray,
+            |_| true
+        ));
+        assert!(!super::super::traverse::occluded(
+            Portable,
+            &tree,
+            &ray,
+            |_| false
+        ));
     }
 }
