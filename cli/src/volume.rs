@@ -163,7 +163,7 @@ fn mass(file: &File, info: &GridInfo, topology: &Topology) -> Result<(Mass, Vec<
 }
 
 /// Values below this share of the largest are a veil that a picture need not hold.
-const VEIL: f64 = 0.02;
+const VEIL: f64 = 0.005;
 /// Directions in which the outline is searched.
 const DIRECTIONS: usize = 256;
 

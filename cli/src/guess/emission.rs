@@ -5,11 +5,11 @@ use crate::args::Guesses;
 use crate::failure::{Outcome, input};
 use crate::info::short;
 use crate::volume::{self, Measures};
-use resolvent_scene::PluginBlock;
+use resolvent_scene::Value;
 use resolvent_vdb::File;
 
 /// Radiance of the brightest fire through a tenth of the volume: brighter than anything the guessed sun lights.
-const RADIANCE: f64 = 5.0;
+const RADIANCE: f64 = 20.0;
 /// Temperature of the hottest voxel where the grid's values cannot be kelvin.
 const HOTTEST: f64 = 2000.0;
 /// Largest value of a grid that is not in kelvin: simulations normalise to 1 or some tens.
@@ -19,15 +19,13 @@ const DARK: f64 = 750.0;
 /// Linear colour of a flame, about that of a black body of 2000 K.
 const FIRE: [f64; 3] = [1.0, 0.36, 0.05];
 
-/// Adds the emission to the medium's parameters. A flame is preferred to a temperature, since smoke can be hot without
-/// burning.
-pub fn add(
-    mut block: PluginBlock,
-    file: &File,
-    g: &Guesses,
-    density: &Measures,
-    notes: &mut Notes,
-) -> Outcome<PluginBlock> {
+/// Parameters of the medium, by name.
+type Params = Vec<(&'static str, Value)>;
+
+/// What glows, as parameters of the medium; empty if nothing does. A flame is preferred to a temperature, since smoke can be
+/// hot without burning.
+pub fn find(file: &File, g: &Guesses, density: &Measures, notes: &mut Notes) -> Outcome<Params> {
+    let mut params = Params::new();
     let [lo, hi] = density.bounds;
     let depth = 0.1 * (0..3).map(|a| (hi[a] - lo[a]).powi(2)).sum::<f64>().sqrt();
     let factor = g.emission_scale.unwrap_or(1.0);
@@ -39,10 +37,10 @@ pub fn add(
             let why = "glows like fire, or none; --emission-scale makes it brighter or dimmer";
             notes.add("--flame-grid", &info.unique_name, why);
         }
-        block = block
-            .with("emission_grid", info.unique_name.as_str())
-            .with("emission_grid_scale", 1.0 / m.max)
-            .with("emission", FIRE.map(|c| c * factor * RADIANCE / depth));
+        let emission = FIRE.map(|c| c * factor * RADIANCE / depth);
+        params.push(("emission_grid", info.unique_name.as_str().into()));
+        params.push(("emission_grid_scale", (1.0 / m.max).into()));
+        params.push(("emission", emission.into()));
     }
     let temperature = grids::temperature(file, g)?;
     if let Some((info, guessed)) = temperature
@@ -56,7 +54,7 @@ pub fn add(
         };
         let hottest = scale * m.max;
         if hottest < DARK {
-            return Ok(block);
+            return Ok(params);
         }
         if guessed {
             let why = format!(
@@ -65,12 +63,12 @@ pub fn add(
             );
             notes.add("--temperature-grid", &info.unique_name, why);
         }
-        block = block
-            .with("temperature_grid", info.unique_name.as_str())
-            .with("temperature_scale", scale)
-            .with("emission_scale", factor * RADIANCE / (depth * red(hottest)));
+        let emission = factor * RADIANCE / (depth * red(hottest));
+        params.push(("temperature_grid", info.unique_name.as_str().into()));
+        params.push(("temperature_scale", scale.into()));
+        params.push(("emission_scale", emission.into()));
     }
-    Ok(block)
+    Ok(params)
 }
 
 /// About the red radiance of a black body, W·sr⁻¹·m⁻²: Planck's law at 600 nm over a band of 100 nm.

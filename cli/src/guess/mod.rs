@@ -19,12 +19,14 @@ use std::path::Path;
 
 /// Optical thickness of the volume: the mean over three lines through its centre of mass.
 const THICKNESS: f64 = 40.0;
+/// The same where something glows inside, which smoke must let through.
+const THICKNESS_OF_FIRE: f64 = 10.0;
 /// Droplets scatter nearly everything, forward.
 const ALBEDO: [f64; 3] = [0.99; 3];
 const G: f64 = 0.85;
 /// A warm sun and a blue sky, as bright as a display can show without exposure.
-const SUN: [f64; 3] = [3.0, 2.85, 2.6];
-const SKY: [f64; 3] = [0.12, 0.18, 0.28];
+const SUN: [f64; 3] = [5.0, 4.75, 4.3];
+const SKY: [f64; 3] = [0.06, 0.11, 0.2];
 /// Full angle of the sun seen from the earth, degrees.
 const SUN_ANGLE: f64 = 0.53;
 const SPP: u64 = 64;
@@ -75,12 +77,20 @@ pub fn scene(path: &Path, a: &Render) -> Outcome<Scene> {
             ))
         })?;
 
+    let glow = emission::find(&file, g, &measures, &mut notes)?;
+    let thickness = if glow.is_empty() {
+        THICKNESS
+    } else {
+        THICKNESS_OF_FIRE
+    };
     let mut block = PluginBlock::new("vdb")
         .with("file", name)
         .with("grid", density.unique_name.as_str())
-        .with("sigma_t", extinction(&measures, g, &mut notes))
+        .with("sigma_t", extinction(&measures, thickness, g, &mut notes))
         .with("albedo", albedo(g, &mut notes));
-    block = emission::add(block, &file, g, &measures, &mut notes)?;
+    for (name, value) in glow {
+        block = block.with(name, value);
+    }
     block = block.with("phase", phase(g, &mut notes));
 
     let up = up(&file, g, &mut notes);
@@ -118,11 +128,11 @@ pub fn scene(path: &Path, a: &Render) -> Outcome<Scene> {
 }
 
 /// Extinction where the grid is 1.
-fn extinction(m: &Measures, g: &Guesses, notes: &mut Notes) -> f64 {
+fn extinction(m: &Measures, thickness: f64, g: &Guesses, notes: &mut Notes) -> f64 {
     if let Some(scale) = g.density_scale {
         return scale;
     }
-    let target = g.optical_thickness.unwrap_or(THICKNESS);
+    let target = g.optical_thickness.unwrap_or(thickness);
     let mean = m.lines.iter().sum::<f64>() / 3.0;
     // A shell has nothing on the lines through its centre: then a third of its box, filled with its mean value.
     let [lo, hi] = m.bounds;
