@@ -68,19 +68,53 @@ impl Aabb {
 
     /// The part of `t0..t1` where the ray `o + t d` is inside, or `None`.
     ///
-    /// A direction component of ±0 gives ±∞ or NaN (0·∞ on a face); `min`/`max` drop the NaN, so a ray that lies
-    /// exactly in a face counts as inside.
+    /// A ray that is parallel to two faces is inside them or not, wherever it starts; one that lies exactly in a face
+    /// counts as inside.
     #[inline(always)]
     pub fn clip(&self, o: Vec3, d: Vec3, t0: f32, t1: f32) -> Option<(f32, f32)> {
         let inv = d.recip();
         let (mut near, mut far) = (t0, t1);
         for i in 0..3 {
+            if d[i] == 0.0 {
+                // 0·∞ below would be NaN for a ray in a face.
+                if !(self.min[i] <= o[i] && o[i] <= self.max[i]) {
+                    return None;
+                }
+                continue;
+            }
             let a = (self.min[i] - o[i]) * inv[i];
             let b = (self.max[i] - o[i]) * inv[i];
-            // The order of the operands matters: `f32::max`/`min` return the other operand if one is NaN.
             near = a.min(b).max(near);
             far = a.max(b).min(far);
         }
         (near < far).then_some((near, far))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rays_in_faces_and_beside_them() {
+        let b = Aabb {
+            min: [0.0; 3],
+            max: [1.0, 2.0, 3.0],
+        };
+        for zero in [0.0, -0.0] {
+            let along_x = Vec3::new(1.0, zero, zero);
+            for y in [0.0, 1.0, 2.0] {
+                let hit = b.clip(Vec3::new(-1.0, y, 3.0), along_x, 0.0, f32::INFINITY);
+                assert_eq!(hit, Some((1.0, 2.0)), "y = {y}");
+            }
+            assert_eq!(
+                b.clip(Vec3::new(-1.0, -1e-6, 1.0), along_x, 0.0, f32::INFINITY),
+                None
+            );
+        }
+        assert_eq!(
+            b.clip(Vec3::splat(0.5), Vec3::NEG_Z, 0.0, 0.25),
+            Some((0.0, 0.25))
+        );
     }
 }

@@ -7,7 +7,7 @@ use super::PlacedMedium;
 use super::view::View;
 use resolvent_api::Vec3;
 use resolvent_api::abi::{Status, scene_traits};
-use resolvent_api::operator::{Flight, FlightDraws, Segment};
+use resolvent_api::operator::{Flight, FlightDraws, Segment, flight_flags};
 use resolvent_api::rng::derive;
 use resolvent_api::{Aabb, Spectrum};
 
@@ -44,7 +44,12 @@ impl View<'_> {
                 let Some(clipped) = clip(m.medium.info.bounds, s) else {
                     return Ok(nothing(s.t1));
                 };
-                let mut flight = self.flight(m, &clipped, u)?;
+                // Nothing else can cut the flight short.
+                let u = FlightDraws {
+                    flags: u.flags | flight_flags::ALONE,
+                    ..*u
+                };
+                let mut flight = self.flight(m, &clipped, &u)?;
                 if !flight.collided() {
                     flight.t = s.t1;
                 }
