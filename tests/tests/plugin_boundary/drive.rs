@@ -18,8 +18,8 @@ pub const EDGE: u32 = 32;
 pub struct Fault {
     /// The message.
     pub text: String,
-    /// Samples per pixel that were finished before.
-    pub kept: Option<Picture>,
+    /// What was finished before.
+    pub kept: Option<Box<Picture>>,
 }
 
 /// A picture.
@@ -202,7 +202,7 @@ pub fn picture(scene: &Value, registry: &Registry, samples: u32) -> Result<Pictu
         Ok(r) => Ok(Picture::new(&r)),
         Err(b) => Err(Fault {
             text: b.error.to_string(),
-            kept: b.rendered.map(|r| Picture::new(&r)),
+            kept: b.rendered.map(|r| Box::new(Picture::new(&r))),
         }),
     }
 }

@@ -106,7 +106,7 @@ fn plugins_that_break() {
         (
             "eval",
             haze("eval panics"),
-            [&phase, "'haze'", "unruly as asked"],
+            [&phase, "'haze'", "panicked in eval"],
         ),
         (
             "render",

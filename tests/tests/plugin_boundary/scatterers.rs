@@ -25,18 +25,8 @@ fn phase_functions() {
             "closure panics",
             &["medium 'haze'", "unruly as asked: closure"],
         ),
-        (
-            "eval panics",
-            &["medium 'haze'", "panicked in eval", "unruly as asked: eval"],
-        ),
-        (
-            "sample panics",
-            &[
-                "medium 'haze'",
-                "panicked in sample",
-                "unruly as asked: sample",
-            ],
-        ),
+        ("eval panics", &["medium 'haze'", "panicked in eval"]),
+        ("sample panics", &["medium 'haze'", "panicked in sample"]),
         (
             "eval is NaN",
             &["medium 'haze'", "eval gave a value that is not finite"],
@@ -75,21 +65,10 @@ fn bsdfs() {
             "closure panics",
             &["material 'plaster'", "unruly as asked: closure"],
         ),
-        (
-            "eval panics",
-            &[
-                "material 'plaster'",
-                "panicked in eval",
-                "unruly as asked: eval",
-            ],
-        ),
+        ("eval panics", &["material 'plaster'", "panicked in eval"]),
         (
             "sample panics",
-            &[
-                "material 'plaster'",
-                "panicked in sample",
-                "unruly as asked: sample",
-            ],
+            &["material 'plaster'", "panicked in sample"],
         ),
         (
             "eval is NaN",

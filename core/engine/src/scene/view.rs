@@ -299,6 +299,5 @@ unsafe extern "C" fn connect<const SURFACES: bool, const MEDIA: u8>(
 unsafe extern "C" fn fault(ctx: *const c_void, vertex: *const Vertex, message: Text) -> Status {
     // SAFETY: as above.
     let (v, vertex, message) = unsafe { (view(ctx), &*vertex, message.to_owned()) };
-    let said = crate::plugin::pending_failure().map_or_else(String::new, |why| format!(": {why}"));
-    v.fail(format!("{} {message}{said}", v.scene.scatterer(vertex)))
+    v.fail(format!("{} {message}", v.scene.scatterer(vertex)))
 }
