@@ -2,7 +2,7 @@
 
 use crate::appearance::Appearance;
 use crate::blackbody::{Blackbody, COLDEST};
-use crate::bounds::{Bounds, summarise};
+use crate::bounds::{Bounds, BrickCell, summarise};
 use crate::channel::{Channel, local_shift};
 use crate::coarse::Coarse;
 use crate::cursor::ToLocal;
@@ -10,6 +10,7 @@ use crate::field::VdbField;
 use crate::index::{Found, GROUP, Index, child};
 use crate::load::{self, Box3, Cover, Loaded, Services, Values, corners, load, union};
 use crate::settings::{Choice, Settings};
+use crate::voxel::each;
 use crate::voxel::{Half, Voxel};
 use resolvent_api::math::DVec3;
 use resolvent_api::math::Vec3;
@@ -22,7 +23,7 @@ use resolvent_vdb::{File, GridClass, GridInfo, ValueType};
 /// the resolution of `f32`.
 const THICKEST_VOXEL: f64 = 1e6;
 /// Expected null collisions on the way through one brick above which its voxels are visited one by one.
-const ROUGH: f32 = 64.0;
+const ROUGH: f32 = 512.0;
 /// Optical thickness above which connections are estimated by survival.
 const THICK: f32 = 12.0;
 /// Groups that are made for emission where there is no density; beyond, emission is sampled by larger regions.
@@ -147,10 +148,14 @@ impl Plan<'_> {
 
         let longest = edges[0].max(edges[1]).max(edges[2]);
         let length = 8.0 * longest as f32 * sigma.max_lane();
-        let rough = |max: f32, min: f32| (max - min) * length > ROUGH && min < 0.5 * max;
+        // Null collisions to be expected on the way through a brick.
+        let rough = |b: Bounds| (b.max - b.min) * length > ROUGH && b.min < 0.5 * b.max;
         let summary = summarise(grid, self.services.parallel, rough);
         let coarse = Coarse::new(grid, &summary.means);
-        let top = summary.cells.iter().fold(0.0f32, |m, c| m.max(c.max));
+        let top = summary
+            .cells
+            .iter()
+            .fold(0.0f32, |m, c| m.max(c.bounds.max));
         let mut peak = top;
         grid.index
             .uniform(&mut |_, _, constant| peak = peak.max(grid.of_slot(constant, 0)));
@@ -193,16 +198,16 @@ impl Plan<'_> {
         info.memory = (grid.memory()
             + appearance.memory()
             + coarse.memory()
-            + summary.cells.len() * size_of::<Bounds>()) as u64;
+            + summary.cells.len() * size_of::<BrickCell>()) as u64;
 
         let field = VdbField::<_, V, true> {
             info,
             sigma,
             grid: loaded.grid,
             cells: summary.cells,
-            to_local: ToLocal::new(&inverse),
-            lo: local_lo.as_vec3().into(),
-            hi: local_hi.as_vec3().into(),
+            to_local: ToLocal::new(&full, &inverse, 0.5 * (local_lo + local_hi)),
+            lo: local_lo.as_vec3a(),
+            hi: local_hi.as_vec3a(),
             appearance,
             coarse,
         };
@@ -275,8 +280,8 @@ impl Plan<'_> {
     ) {
         let extent = index.extent();
         self.emission_boxes(appearance, index.base, &mut |lo, hi| {
-            let from = [0, 1, 2].map(|i| (lo[i] >> 3).clamp(0, extent[i] - 1));
-            let to = [0, 1, 2].map(|i| (hi[i] >> 3).clamp(0, extent[i] - 1));
+            let from = each(|i| (lo[i] >> 3).clamp(0, extent[i] - 1));
+            let to = each(|i| (hi[i] >> 3).clamp(0, extent[i] - 1));
             for x in (from[0]..=to[0]).step_by(8).chain([to[0]]) {
                 for y in (from[1]..=to[1]).step_by(8).chain([to[1]]) {
                     for z in (from[2]..=to[2]).step_by(8).chain([to[2]]) {
@@ -330,8 +335,8 @@ impl Plan<'_> {
         let mut bits = vec![0u64; index.slots.len() / 64];
         let extent = index.extent();
         self.emission_boxes(appearance, index.base, &mut |lo, hi| {
-            let from = [0, 1, 2].map(|i| (lo[i] >> 3).clamp(0, extent[i] - 1));
-            let to = [0, 1, 2].map(|i| (hi[i] >> 3).clamp(0, extent[i] - 1));
+            let from = each(|i| (lo[i] >> 3).clamp(0, extent[i] - 1));
+            let to = each(|i| (hi[i] >> 3).clamp(0, extent[i] - 1));
             for x in from[0]..=to[0] {
                 for y in from[1]..=to[1] {
                     let mut z = from[2];

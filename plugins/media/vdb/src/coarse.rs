@@ -78,19 +78,16 @@ impl Coarse {
     }
 
     /// The integral of the density along a ray, over world length.
-    pub fn integral(&self, ray: &Cursor) -> f32 {
-        let size = EDGE << self.log;
-        let mut at = ray.next.map(|c| c >> self.log);
-        let (mut t, mut sum) = (ray.t, 0.0);
-        while t < ray.t1 && (0..3).all(|i| (at[i] as u32) < self.dims[i] as u32) {
-            let (exit, axis) = ray.exit(ray.o, at.map(|c| c * size), size);
-            let end = exit.max(t).min(ray.t1);
-            sum += self.means[self.entry(at)] * (end - t);
-            at[axis] += ray.step(axis);
-            t = end;
-            if ray.step(axis) == 0 {
+    pub fn integral(&self, ray: &mut Cursor) -> f32 {
+        let size = (EDGE << self.log) as f32;
+        let mut sum = 0.0;
+        while ray.t < ray.t1 {
+            let at = ray.next_voxel().map(|c| c >> (self.log + 3));
+            if (0..3).any(|i| at[i] >= self.dims[i]) {
                 break;
             }
+            let (t0, t1) = ray.enter(size);
+            sum += self.means[self.entry(at)] * (t1 - t0);
         }
         sum
     }

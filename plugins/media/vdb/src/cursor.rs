@@ -1,40 +1,67 @@
-//! A ray on its way through the cells: hierarchical DDA in local coordinates.
+//! A ray on its way through the cells, in local coordinates.
 //!
-//! The ray is transformed once; its direction is not normalised again, so t stays world length. Planes of cells are
-//! intersected from their integer coordinates each time, never by accumulation, and the end of a cell is the start of the next:
-//! stretches are monotone and leave no gaps, whatever the rounding. Every step moves on by at least one brick or voxel, so
-//! the walk ends.
+//! Cells are cubes of any size: empty regions, groups of bricks, bricks, parts of bricks, voxels. The ray is transformed once;
+//! its direction is not normalised again, so t stays world length. Planes are intersected from their whole coordinates each time,
+//! never by accumulation, and the end of a cell is the start of the next: stretches are monotone and leave no gaps, whatever the
+//! rounding. Every step crosses at least one plane of the cell in the ray's direction and stays within the cell's extent on the
+//! other axes, so the walk ends. Where a ray leaves through an edge or a corner, it crosses all its planes at once.
+//!
+//! Coordinates of voxels are whole numbers in `f32`, exact below 2²⁴: three of them share a vector register with what they are
+//! compared with, and [`whole`] turns them into integers where an index is needed.
 
-use crate::voxel::EDGE;
-use resolvent_api::Affine;
-use resolvent_api::Segment;
+use crate::voxel::each;
+use glam::{DVec3, Vec3A};
+use resolvent_api::{Affine, Segment};
 
-/// From world to local coordinates.
-#[derive(Clone, Copy, Debug)]
+/// Adding 2²³ leaves no room for a fraction.
+const TWO_23: f32 = 8_388_608.0;
+
+/// Whole numbers in 0..2²² as integers. Of other numbers in that range, the nearest.
+#[inline(always)]
+pub fn whole(v: Vec3A) -> [i32; 3] {
+    let shifted = (v + Vec3A::splat(TWO_23)).to_array();
+    each(|i| (shifted[i].to_bits() & 0x7f_ffff) as i32)
+}
+
+/// The nearest multiples of `size`, a power of two, to numbers below 2²² in size.
+#[inline(always)]
+fn nearest(v: Vec3A, size: f32) -> Vec3A {
+    let shift = Vec3A::splat(1.5 * TWO_23 * size);
+    (v + shift) - shift
+}
+
+/// From world to local coordinates, in `f32`: positions are first taken relative to a point near the grid, where nothing is
+/// lost, so that a scene far from its origin is no less accurate than its positions are.
+#[derive(Clone, Copy)]
 pub struct ToLocal {
-    rows: [[f64; 4]; 3],
+    columns: [Vec3A; 3],
+    /// A world position near the grid,
+    near: Vec3A,
+    /// and the local one it maps to.
+    at: Vec3A,
 }
 
 impl ToLocal {
-    /// From the transform's inverse.
-    pub fn new(affine: &Affine) -> Self {
+    /// From the transform of local coordinates to the world, and its inverse; `middle` is a local position near the data.
+    pub fn new(to_world: &Affine, inverse: &Affine, middle: DVec3) -> Self {
+        let near = to_world.point(middle).as_vec3a();
         Self {
-            rows: affine.to_rows(),
+            columns: inverse.columns.map(|c| c.as_vec3a()),
+            near,
+            at: inverse.point(near.as_dvec3()).as_vec3a(),
         }
     }
 
-    /// A point; in double precision, since a scene may be far from its origin.
+    /// A point.
     #[inline(always)]
-    pub fn point(&self, p: [f32; 3]) -> [f32; 3] {
-        let [x, y, z] = p.map(f64::from);
-        self.rows
-            .map(|r| (r[0] * x + r[1] * y + r[2] * z + r[3]) as f32)
+    pub fn point(&self, p: [f32; 3]) -> Vec3A {
+        self.vector(Vec3A::from(p) - self.near) + self.at
     }
 
     #[inline(always)]
-    fn vector(&self, v: [f32; 3]) -> [f32; 3] {
-        let [x, y, z] = v.map(f64::from);
-        self.rows.map(|r| (r[0] * x + r[1] * y + r[2] * z) as f32)
+    fn vector(&self, v: Vec3A) -> Vec3A {
+        let [x, y, z] = self.columns;
+        x * v.x + y * v.y + z * v.z
     }
 }
 
@@ -42,145 +69,124 @@ impl ToLocal {
 #[derive(Clone, Copy)]
 pub struct Cursor {
     /// Origin.
-    pub o: [f32; 3],
+    o: Vec3A,
     /// Direction per world length.
-    pub d: [f32; 3],
-    /// 1/`d`; +∞ along axes that the ray doesn't move on.
-    inv: [f32; 3],
-    /// Signs of `d`.
-    step: [i32; 3],
+    d: Vec3A,
+    /// 1/`d`.
+    inv: Vec3A,
+    /// 1 where the ray goes up, else 0.
+    up: Vec3A,
+    /// −∞ along axes that the ray moves on, +∞ along the others, whose planes it never reaches.
+    never: Vec3A,
     /// Start of the next cell.
     pub t: f32,
     /// End of the ray.
     pub t1: f32,
-    /// Brick coordinates of the next cell.
-    pub next: [i32; 3],
-    /// Brick coordinates of the current cell.
-    pub brick: [i32; 3],
-    /// Origin relative to the current cell's brick.
-    pub rel: [f32; 3],
-    /// Slot of the current brick.
-    pub slot: u32,
-    /// Position of the current cell among all cells; only in groups.
-    pub cell: usize,
+    /// A voxel of the next cell.
+    next: Vec3A,
+    /// Lower corner and edge of the current cell.
+    corner: Vec3A,
+    edge: f32,
+    /// Where the ray reaches its planes.
+    planes: Vec3A,
 }
 
 impl Cursor {
     /// A ray clipped to the local box `lo..hi`; `None` if it misses.
     #[inline(always)]
-    pub fn new(to_local: &ToLocal, s: &Segment, lo: [f32; 3], hi: [f32; 3]) -> Option<Self> {
-        let (o, mut d) = (to_local.point(s.o), to_local.vector(s.d));
-        if !(o[0] + o[1] + o[2]).is_finite() {
+    pub fn new(to_local: &ToLocal, s: &Segment, lo: Vec3A, hi: Vec3A) -> Option<Self> {
+        let (o, d) = (to_local.point(s.o), to_local.vector(s.d.into()));
+        let infinity = Vec3A::splat(f32::INFINITY);
+        // Slower than this, a ray doesn't get from one voxel to the next within the widest domain.
+        let idle = d.abs().cmple(Vec3A::splat(1e-12 * d.abs().max_element()));
+        let d = Vec3A::select(idle, Vec3A::ZERO, d);
+        let inv = d.recip();
+        let (a, b) = ((lo - o) * inv, (hi - o) * inv);
+        // Along an idle axis (0·∞ included) the ray is in the box for ever, or not at all: then the last test fails.
+        let near = Vec3A::select(idle, -infinity, a.min(b)).max_element();
+        let far = Vec3A::select(idle, infinity, a.max(b)).min_element();
+        let t = if near > s.t0 { near } else { s.t0 };
+        let t1 = if far < s.t1 { far } else { s.t1 };
+        let outside = idle & (o.cmplt(lo) | o.cmpgt(hi));
+        // A NaN in the ray makes the sum one.
+        let sound = (o + d).element_sum() + t < f32::INFINITY;
+        if !(t < t1 && sound) || outside.any() {
             return None;
         }
-        let fastest = d[0].abs().max(d[1].abs()).max(d[2].abs());
-        let (mut t, mut t1) = (s.t0, s.t1);
-        let mut inv = [f32::INFINITY; 3];
-        let mut step = [0; 3];
-        for i in 0..3 {
-            // Slower than this, a ray doesn't get from one voxel to the next within the widest domain.
-            if d[i].abs() > 1e-12 * fastest {
-                inv[i] = 1.0 / d[i];
-                step[i] = if d[i] > 0.0 { 1 } else { -1 };
-                let (a, b) = ((lo[i] - o[i]) * inv[i], (hi[i] - o[i]) * inv[i]);
-                t = t.max(a.min(b));
-                t1 = t1.min(a.max(b));
-            } else {
-                d[i] = 0.0;
-                // On the faces counts as inside.
-                if !(lo[i] <= o[i] && o[i] <= hi[i]) {
-                    return None;
-                }
-            }
-        }
-        if !(t < t1) {
-            return None;
-        }
-        let next = [0, 1, 2].map(|i| (o[i] + t * d[i]).clamp(lo[i], hi[i]) as i32 >> 3);
+        let p = (o + d * t).max(lo).min(hi);
         Some(Self {
             o,
             d,
             inv,
-            step,
+            up: Vec3A::select(d.cmpgt(Vec3A::ZERO), Vec3A::ONE, Vec3A::ZERO),
+            never: Vec3A::select(idle, infinity, -infinity),
             t,
             t1,
-            next,
-            brick: [0; 3],
-            rel: [0.0; 3],
-            slot: 0,
-            cell: 0,
+            // Any voxel that holds `p`, on a face either of two: the nearest whole number to p − ½.
+            next: nearest(p - Vec3A::splat(0.5), 1.0).max(Vec3A::ZERO),
+            corner: Vec3A::ZERO,
+            edge: 0.0,
+            planes: Vec3A::ZERO,
         })
     }
 
-    /// Where the ray leaves the cube with edge `size` whose lower corner is `corner` relative to a point from which `o` is the
-    /// origin: t, and the axis across whose face.
+    /// A voxel of the next cell; large numbers outside the domain.
     #[inline(always)]
-    pub fn exit(&self, o: [f32; 3], corner: [i32; 3], size: i32) -> (f32, usize) {
-        let t = [0, 1, 2].map(|i| {
-            // Along an axis the ray doesn't move on, `inv` = ∞ and the plane lies at ∞: ∞·∞, never 0·∞.
-            let plane = if self.step[i] == 0 {
-                f32::INFINITY
-            } else {
-                (corner[i] + if self.step[i] > 0 { size } else { 0 }) as f32
-            };
-            (plane - o[i]) * self.inv[i]
-        });
-        if t[0] <= t[1] && t[0] <= t[2] {
-            (t[0], 0)
-        } else if t[1] <= t[2] {
-            (t[1], 1)
-        } else {
-            (t[2], 2)
+    pub fn next_voxel(&mut self) -> [i32; 3] {
+        if self.edge > 0.0 {
+            self.cross();
         }
+        whole(self.next)
     }
 
-    /// Makes the next brick the current one and moves on to the brick after it. Returns where the current one starts and
-    /// ends.
+    /// Finds a voxel of the cell behind the current one.
     #[inline(always)]
-    pub fn advance(&mut self) -> (f32, f32) {
+    fn cross(&mut self) {
+        let last = Vec3A::splat(self.edge - 1.0);
+        let crossed = self.planes.cmple(Vec3A::splat(self.planes.min_element()));
+        let across = self.corner + self.up * (self.edge + 1.0) - Vec3A::ONE;
+        // Along the other axes the position says which voxel, within the face that the ray goes through.
+        let p = self.o + self.d * self.t;
+        let along = nearest(p - Vec3A::splat(0.5), 1.0);
+        let along = along.max(self.corner).min(self.corner + last);
+        self.next = Vec3A::select(crossed, across, along);
+    }
+
+    /// Makes the cell of this edge (a power of two) around the next voxel the current one. Returns where it starts and ends.
+    #[inline(always)]
+    pub fn enter(&mut self, edge: f32) -> (f32, f32) {
         let start = self.t;
-        self.brick = self.next;
-        self.rel = [0, 1, 2].map(|i| self.o[i] - (self.brick[i] * EDGE) as f32);
-        let (t, axis) = self.exit(self.rel, [0; 3], EDGE);
-        self.next[axis] += self.step[axis];
-        self.t = t.max(start);
-        (start, self.t.min(self.t1))
+        // The middle of a cell's voxels is less than half an edge from its corner, plus the half that is taken off.
+        self.corner = nearest(self.next - Vec3A::splat(0.5 * (edge - 1.0)), edge);
+        self.edge = edge;
+        self.planes = ((self.corner + self.up * edge - self.o) * self.inv).max(self.never);
+        let t = self.planes.min_element();
+        self.t = if t > start { t } else { start };
+        (start, if self.t < self.t1 { self.t } else { self.t1 })
     }
 
-    /// As [`Cursor::advance`], for a region with edges of 2^`log` bricks around the next brick.
-    pub fn advance_region(&mut self, log: u32) -> (f32, f32) {
-        let start = self.t;
-        let corner = self.next.map(|c| c >> log << log);
-        let edge = 1 << log;
-        let (t, axis) = self.exit(self.o, corner.map(|c| c * EDGE), edge * EDGE);
-        self.t = t.max(start);
-        self.next = [0, 1, 2].map(|i| {
-            if i == axis {
-                corner[i] + if self.step[i] > 0 { edge } else { -1 }
-            } else {
-                // The position says which brick, within the face that the ray goes through.
-                let at = (self.o[i] + self.t * self.d[i]) as i32 >> 3;
-                at.clamp(corner[i], corner[i] + edge - 1)
-            }
-        });
-        (start, self.t.min(self.t1))
-    }
-
-    /// Steps of a voxel coordinate along an axis.
+    /// Lower corner of the current cell.
     #[inline(always)]
-    pub fn step(&self, axis: usize) -> i32 {
-        self.step[axis]
+    pub fn corner(&self) -> Vec3A {
+        self.corner
     }
 
-    /// Position relative to the current brick.
+    /// The current cell's last voxel, relative to its first.
     #[inline(always)]
-    pub fn within(&self, t: f32) -> [f32; 3] {
-        [0, 1, 2].map(|i| self.rel[i] + t * self.d[i])
+    pub fn last(&self) -> Vec3A {
+        Vec3A::splat(self.edge - 1.0)
+    }
+
+    /// Position relative to the current cell's corner, not outside the cell.
+    #[inline(always)]
+    pub fn within(&self, t: f32) -> Vec3A {
+        let p = (self.o - self.corner) + self.d * t;
+        p.max(Vec3A::ZERO).min(Vec3A::splat(self.edge))
     }
 
     /// Position.
     #[inline(always)]
-    pub fn at(&self, t: f32) -> [f32; 3] {
-        [0, 1, 2].map(|i| self.o[i] + t * self.d[i])
+    pub fn at(&self, t: f32) -> Vec3A {
+        self.o + self.d * t
     }
 }

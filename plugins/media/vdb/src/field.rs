@@ -1,13 +1,14 @@
 //! The voxels as tracking sees them.
 
 use crate::appearance::Appearance;
-use crate::bounds::Bounds;
+use crate::bounds::{Bounds, BrickCell};
 use crate::coarse::Coarse;
-use crate::cursor::{Cursor, ToLocal};
+use crate::cursor::{Cursor, ToLocal, whole};
 use crate::fine::Fine;
 use crate::grid::Grid;
 use crate::index::{Found, GROUP, UNIFORM, child};
-use crate::voxel::Voxel;
+use crate::voxel::{Voxel, each};
+use glam::Vec3A;
 use resolvent_api::math::Vec3;
 use resolvent_api::{Cell, Coefficients, Field, Lanes, MediumInfo, Segment, Spectrum};
 
@@ -21,23 +22,28 @@ pub struct VdbField<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> {
     pub sigma: L,
     /// The density.
     pub grid: Grid<V>,
-    /// Bounds of the cells, in the order of the index's slots.
-    pub cells: Vec<Bounds>,
+    /// The cells, in the order of the index's slots.
+    pub cells: Vec<BrickCell>,
     /// From world to local coordinates.
     pub to_local: ToLocal,
     /// The local box outside which there is nothing.
-    pub lo: [f32; 3],
+    pub lo: Vec3A,
     /// Its upper corner.
-    pub hi: [f32; 3],
+    pub hi: Vec3A,
     /// Albedo and emission.
     pub appearance: Appearance,
     /// Means for [`Field::depth`].
     pub coarse: Coarse,
 }
 
-/// Where a ray is: see [`Cursor`], and [`Fine`] inside a rough brick.
+/// Where a ray is.
 pub struct Walk {
     ray: Cursor,
+    /// Slot of the current brick.
+    slot: u32,
+    /// The current brick among all cells; `usize::MAX` outside groups.
+    cell: usize,
+    /// Inside a voxel's cell.
     fine: Option<Fine>,
 }
 
@@ -45,29 +51,32 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> VdbField<L, V, EMISS
     /// The value at `t` inside the current cell from a single voxel: ⌊x + u⌋ with u uniform in [0, 1)³ is each of the eight
     /// corners with the probability of its trilinear weight.
     #[inline(always)]
-    fn tap(&self, ray: &Cursor, t: f32, jitter: u64) -> f32 {
-        let p = ray.within(t);
-        // 1 + u: the bits become a mantissa, which needs no conversion.
-        let u = [jitter, jitter >> 21, jitter >> 42]
-            .map(|b| f32::from_bits(0x3f80_0000 | (b as u32 & 0x1f_ffff) << 2));
-        let v = if self.grid.trilinear {
-            // Rounding may place `p` just outside the cell: the limits keep the voxel inside the cell's bounds.
-            [0, 1, 2].map(|i| (p[i] + u[i]).clamp(1.0, 9.0) as i32 - 1)
+    fn tap(&self, walk: &Walk, t: f32, jitter: u64) -> f32 {
+        // Relative to the cell and inside it: rounding must not lead to voxels that its bounds don't know of.
+        let p = walk.ray.within(t);
+        let p = if self.grid.trilinear {
+            // ⌊p + u⌋ as the whole number nearest to p + u − ½. The bits become the mantissa of 1 + u, which needs no
+            // conversion, and 1.5 is taken off again without rounding.
+            let bits = each(|i| (jitter >> (21 * i)) as u32 & 0x1f_ffff);
+            let u = Vec3A::from(each(|i| f32::from_bits(0x3f80_0000 | bits[i] << 2)));
+            p + (u - Vec3A::splat(1.5))
         } else {
-            p.map(|c| c.clamp(0.0, 7.0) as i32)
+            (p - Vec3A::splat(0.5)).min(walk.ray.last())
         };
-        if (v[0] | v[1] | v[2]) < 8 {
-            return self.grid.of_slot(ray.slot, crate::voxel::offset(v));
+        // A ½ at the far end rounds to even, which is the end: never out of the cell.
+        let (within, corner) = (whole(p.max(Vec3A::ZERO)), whole(walk.ray.corner()));
+        let at = each(|i| corner[i] + within[i]);
+        let same = each(|i| at[i] ^ corner[i]);
+        if (same[0] | same[1] | same[2]) < 8 {
+            return self.grid.of_slot(walk.slot, crate::voxel::offset(at));
         }
-        self.tap_beyond(ray, v)
+        self.tap_beyond(at)
     }
 
     /// A tap in one of the bricks behind the current one.
     #[inline]
-    fn tap_beyond(&self, ray: &Cursor, v: [i32; 3]) -> f32 {
-        let brick = [0, 1, 2].map(|i| ray.brick[i] + (v[i] >> 3));
-        self.grid
-            .of_slot(self.grid.index.slot(brick), crate::voxel::offset(v))
+    fn tap_beyond(&self, at: [i32; 3]) -> f32 {
+        self.grid.voxel(at)
     }
 
     #[inline(always)]
@@ -80,12 +89,21 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> VdbField<L, V, EMISS
         }
     }
 
+    #[cold]
+    fn corners(&self, voxel: [i32; 3]) -> [f32; 8] {
+        if self.grid.trilinear {
+            self.grid.corners(voxel)
+        } else {
+            [self.grid.voxel(voxel); 8]
+        }
+    }
+
     /// The value at `t`, interpolated.
     #[inline]
     fn exact(&self, walk: &Walk, t: f32) -> f32 {
         match &walk.fine {
             Some(fine) => fine.value(&walk.ray, t),
-            None => self.grid.sample(walk.ray.at(t)),
+            None => self.grid.sample(walk.ray.at(t).to_array()),
         }
     }
 }
@@ -105,16 +123,19 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
     #[inline(always)]
     fn enter(&self, s: &Segment) -> Option<Walk> {
         let ray = Cursor::new(&self.to_local, s, self.lo, self.hi)?;
-        Some(Walk { ray, fine: None })
+        Some(Walk {
+            ray,
+            slot: 0,
+            cell: 0,
+            fine: None,
+        })
     }
 
     #[inline(always)]
     fn next_cell(&self, walk: &mut Walk) -> Option<Cell<L>> {
         loop {
             if let Some(fine) = &mut walk.fine {
-                if let Some((t0, t1, bounds)) =
-                    fine.next(&self.grid, &walk.ray, self.sigma.max_lane())
-                {
+                if let Some((t0, t1, bounds)) = fine.next(&walk.ray, self.sigma.max_lane()) {
                     return Some(self.cell(t0, t1, bounds));
                 }
                 walk.fine = None;
@@ -123,28 +144,28 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
             if !(ray.t < ray.t1) {
                 return None;
             }
-            match self.grid.index.find(ray.next)? {
+            let voxel = ray.next_voxel();
+            let brick = each(|i| voxel[i] >> 3);
+            match self.grid.index.find(brick)? {
                 Found::Group(group) => {
-                    let cell = group as usize * GROUP + child(ray.next);
-                    let bounds = self.cells[cell];
-                    let (t0, t1) = ray.advance();
-                    if bounds.max == 0.0 && !(EMISSIVE && self.appearance.emits(cell)) {
+                    walk.cell = group as usize * GROUP + child(brick);
+                    let BrickCell { bounds, slot } = self.cells[walk.cell];
+                    walk.slot = slot;
+                    if bounds.min < 0.0 {
+                        let (t0, t1) = ray.enter(1.0);
+                        walk.fine = Some(Fine::new((t0, t1), self.corners(voxel)));
                         continue;
                     }
-                    ray.slot = self.grid.index.slots[cell];
-                    ray.cell = cell;
-                    if bounds.min < 0.0 {
-                        walk.fine = Some(Fine::new(ray, t0, t1));
+                    let (t0, t1) = ray.enter(8.0);
+                    if bounds.max == 0.0 && !(EMISSIVE && self.appearance.emits(walk.cell)) {
                         continue;
                     }
                     return Some(self.cell(t0, t1, bounds));
                 }
                 Found::Uniform(constant, log) => {
                     let value = self.grid.constants[(constant & !UNIFORM) as usize];
-                    ray.brick = ray.next;
-                    ray.slot = constant;
-                    ray.cell = usize::MAX;
-                    let (t0, t1) = ray.advance_region(log);
+                    (walk.slot, walk.cell) = (constant, usize::MAX);
+                    let (t0, t1) = ray.enter((8u32 << log) as f32);
                     if value == 0.0 && !EMISSIVE {
                         continue;
                     }
@@ -162,7 +183,7 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
     fn extinction(&self, walk: &mut Walk, t: f32, jitter: u64) -> L {
         let value = match &walk.fine {
             Some(fine) => fine.value(&walk.ray, t),
-            None => self.tap(&walk.ray, t, jitter),
+            None => self.tap(walk, t, jitter),
         };
         self.sigma * value
     }
@@ -181,22 +202,26 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
             None => self.sigma,
         }
         .spectrum();
-        (sigma_t, sigma_t * self.appearance.albedo(walk.ray.at(t)))
+        (
+            sigma_t,
+            sigma_t * self.appearance.albedo(walk.ray.at(t).to_array()),
+        )
     }
 
     #[inline(always)]
     fn emission(&self, walk: &mut Walk, t: f32) -> Spectrum {
-        if !EMISSIVE || !self.appearance.emits(walk.ray.cell) {
+        if !EMISSIVE || !self.appearance.emits(walk.cell) {
             return Spectrum::ZERO;
         }
-        self.appearance.emission(walk.ray.at(t))
+        self.appearance.emission(walk.ray.at(t).to_array())
     }
 
     fn coefficients(&self, p: Vec3) -> Coefficients {
         let p = self.to_local.point(p.into());
-        if (0..3).any(|i| !(self.lo[i] <= p[i] && p[i] <= self.hi[i])) {
+        if !(self.lo.cmple(p) & p.cmple(self.hi)).all() {
             return Coefficients::default();
         }
+        let p = p.to_array();
         let sigma_t = (self.sigma * self.grid.sample(p)).spectrum();
         Coefficients {
             sigma_t,
@@ -207,7 +232,7 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
 
     fn depth(&self, s: &Segment) -> Spectrum {
         match Cursor::new(&self.to_local, s, self.lo, self.hi) {
-            Some(ray) => (self.sigma * self.coarse.integral(&ray)).spectrum(),
+            Some(mut ray) => (self.sigma * self.coarse.integral(&mut ray)).spectrum(),
             None => Spectrum::ZERO,
         }
     }

@@ -1,6 +1,7 @@
 //! A grid in memory: index, bricks and constants, with exact interpolation.
 
 use crate::index::{DEFAULT, Index, UNIFORM};
+use crate::voxel::each;
 use crate::voxel::{Brick, Mix, Voxel, offset};
 
 /// Voxel values by position. Positions are local: in voxels, with voxel centres at integers, counted from the index's base.
@@ -37,7 +38,7 @@ impl<V: Voxel> Grid<V> {
     /// The value of a voxel, the background's outside the domain.
     #[inline]
     pub fn voxel(&self, v: [i32; 3]) -> V::Value {
-        self.of_slot(self.index.slot(v.map(|c| c >> 3)), offset(v))
+        self.of_slot(self.index.slot(each(|i| v[i] >> 3)), offset(v))
     }
 
     /// The background's value.
@@ -57,7 +58,7 @@ impl<V: Voxel> Grid<V> {
         };
         if v.iter().all(|c| c & 7 < 7) {
             // All in one brick, as in two of three cases.
-            let slot = self.index.slot(v.map(|c| c >> 3));
+            let slot = self.index.slot(each(|i| v[i] >> 3));
             return std::array::from_fn(|i| self.of_slot(slot, offset(at(i))));
         }
         std::array::from_fn(|i| self.voxel(at(i)))
@@ -66,12 +67,12 @@ impl<V: Voxel> Grid<V> {
     /// The value at a position: that of OpenVDB's `BoxSampler` if trilinear, of its `PointSampler` otherwise.
     #[inline]
     pub fn sample(&self, p: [f32; 3]) -> V::Value {
-        let floor = p.map(f32::floor);
-        let v = floor.map(|c| c as i32);
+        let floor = each(|i| p[i].floor());
+        let v = each(|i| floor[i] as i32);
         if !self.trilinear {
             return self.voxel(v);
         }
-        trilinear(&self.corners(v), [0, 1, 2].map(|i| p[i] - floor[i]))
+        trilinear(&self.corners(v), each(|i| p[i] - floor[i]))
     }
 }
 

@@ -11,6 +11,7 @@
 //!
 //! Coordinates here are *local*: voxels counted from [`Index::base`], never negative inside the domain.
 
+use crate::voxel::each;
 use std::collections::HashMap;
 
 /// Marks entries and slots that stand for a constant.
@@ -86,7 +87,7 @@ impl Index {
         loop {
             let unit = 8i64 << log;
             let base = lo.map(|c| c.div_euclid(unit) * unit);
-            let dims = [0, 1, 2].map(|i| (hi[i] - base[i]) / unit + 1);
+            let dims = each(|i| (hi[i] - base[i]) / unit + 1);
             let entries: i64 = dims.iter().product();
             if entries <= most {
                 return Ok(Self {
@@ -115,7 +116,7 @@ impl Index {
 
     #[inline(always)]
     fn entry(&self, brick: [i32; 3]) -> Option<usize> {
-        let [x, y, z] = brick.map(|c| c >> self.log);
+        let [x, y, z] = each(|i| brick[i] >> self.log);
         let inside = (x as u32) < self.dims[0] as u32
             && (y as u32) < self.dims[1] as u32
             && (z as u32) < self.dims[2] as u32;
@@ -129,7 +130,7 @@ impl Index {
         let mut log = self.log;
         while log > 3 && entry & UNIFORM == 0 {
             log -= 3;
-            entry = self.mid[entry as usize][child(brick.map(|c| c >> log))];
+            entry = self.mid[entry as usize][child(each(|i| brick[i] >> log))];
         }
         Some(if entry & UNIFORM != 0 {
             Found::Uniform(entry, log)
@@ -150,7 +151,7 @@ impl Index {
 
     /// Local brick coordinates of a voxel in index coordinates.
     pub fn brick_of(&self, voxel: [i64; 3]) -> [i64; 3] {
-        [0, 1, 2].map(|i| (voxel[i] - self.base[i]) >> 3)
+        each(|i| (voxel[i] - self.base[i]) >> 3)
     }
 
     /// The entry at `brick` for nodes with edges of 2^`log` bricks, made to exist.
@@ -210,7 +211,7 @@ impl Index {
             0
         };
         let step = 1i64 << unit;
-        let [x, y, z] = [0, 1, 2].map(|i| {
+        let [x, y, z] = each(|i| {
             let (from, to) = (corner[i].max(0), (corner[i] + (1 << log)).min(extent[i]));
             (from..to).step_by(step as usize)
         });
@@ -260,7 +261,7 @@ impl Index {
         };
         for side in 1..8usize {
             let step = [side >> 2 & 1, side >> 1 & 1, side & 1];
-            let there = [0, 1, 2].map(|i| at[i] - 8 * step[i] as i32);
+            let there = each(|i| at[i] - 8 * step[i] as i32);
             let Some(Found::Uniform(constant, _)) = self.find(there) else {
                 continue;
             };
@@ -309,7 +310,7 @@ impl Index {
         let push_children = |work: &mut Vec<(u32, [i32; 3])>| {
             for k in 0..512 {
                 let place = [k >> 6, k >> 3 & 7, k & 7];
-                work.push((log - 3, [0, 1, 2].map(|i| at[i] + (place[i] << (log - 3)))));
+                work.push((log - 3, each(|i| at[i] + (place[i] << (log - 3)))));
             }
         };
         let Some(own) = self.constant(at, log, patterns) else {
@@ -322,7 +323,7 @@ impl Index {
         let mut mixed = false;
         for (side, key) in key.iter_mut().enumerate().skip(1) {
             let step = [side >> 2 & 1, side >> 1 & 1, side & 1];
-            let there = [0, 1, 2].map(|i| at[i] + ((step[i] as i32) << log));
+            let there = each(|i| at[i] + ((step[i] as i32) << log));
             match self.constant(there, log, patterns) {
                 Some(constant) => *key = constant,
                 // A group whose touching layer differs has had its neighbour made into a group already.
@@ -370,7 +371,7 @@ impl Index {
         } else {
             for (k, below) in self.mid[entry as usize].iter().enumerate() {
                 let place = [k as i32 >> 6, k as i32 >> 3 & 7, k as i32 & 7];
-                let at = [0, 1, 2].map(|i| at[i] + (place[i] << (log - 3)));
+                let at = each(|i| at[i] + (place[i] << (log - 3)));
                 self.uniform_below(*below, log - 3, at, visit);
             }
         }

@@ -2,6 +2,7 @@
 
 use crate::grid::Grid;
 use crate::index::{Index, UNIFORM};
+use crate::voxel::each;
 use crate::voxel::{Brick, Voxel};
 use resolvent_api::math::DVec3;
 use resolvent_api::{Affine, Error};
@@ -259,7 +260,7 @@ pub fn load<V: Voxel>(
             for (k, v) in brick.iter_mut().enumerate() {
                 let mut value = v.raw();
                 let place = [k >> 6, k >> 3 & 7, k & 7];
-                let at = [0, 1, 2].map(|a| origin[a] + place[a] as i64);
+                let at = each(|a| origin[a] + place[a] as i64);
                 for c in V::components(&mut value) {
                     *c = values.apply(*c, &mut found, i * 512 + k, at);
                 }
@@ -325,8 +326,8 @@ fn report(
 /// Smallest box around both.
 pub fn union(a: Box3, b: Box3) -> Box3 {
     [
-        [0, 1, 2].map(|i| a[0][i].min(b[0][i])),
-        [0, 1, 2].map(|i| a[1][i].max(b[1][i])),
+        each(|i| a[0][i].min(b[0][i])),
+        each(|i| a[1][i].max(b[1][i])),
     ]
 }
 

@@ -17,6 +17,12 @@ pub fn offset(v: [i32; 3]) -> usize {
     ((v[0] & 7) << 6 | (v[1] & 7) << 3 | (v[2] & 7)) as usize
 }
 
+/// `[f(0), f(1), f(2)]`, inlined without fail, as `array::map` is not.
+#[inline(always)]
+pub fn each<T>(mut f: impl FnMut(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
+
 /// What interpolation needs of a value.
 pub trait Mix: Copy + Send + Sync + PartialEq + 'static {
     /// `a + w (b − a)`, the order of operations of OpenVDB's `BoxSampler`.
@@ -33,7 +39,7 @@ impl Mix for f32 {
 impl Mix for [f32; 3] {
     #[inline(always)]
     fn mix(a: Self, b: Self, w: f32) -> Self {
-        [0, 1, 2].map(|i| f32::mix(a[i], b[i], w))
+        each(|i| f32::mix(a[i], b[i], w))
     }
 }
 

@@ -44,6 +44,34 @@ pub fn inner_segments(medium: &dyn Medium, count: usize) -> Vec<Segment> {
     out
 }
 
+/// Walks from the starts of `seeds`, up to 64 flights each; the number of look-ups.
+fn walk(medium: &dyn Medium, seeds: &[Segment], flights: usize) -> u64 {
+    let mut stream = Stream::new(11);
+    let (mut done, mut lookups) = (0, 0);
+    for seed in seeds.iter().step_by(37).cycle() {
+        let mut s = *seed;
+        for _ in 0..64 {
+            let f = medium.sample(&s, &draws(&mut stream));
+            lookups += u64::from(f.lookups);
+            done += 1;
+            if done == flights {
+                return lookups;
+            }
+            if !f.collided() {
+                break;
+            }
+            let d = warp::sphere(stream.uniform2());
+            s = Segment {
+                o: s.at(f.t).into(),
+                t0: 0.0,
+                d: d.into(),
+                t1: 20.0,
+            };
+        }
+    }
+    lookups
+}
+
 /// Time this thread has run: other processes don't count.
 fn cpu_seconds() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
@@ -56,9 +84,10 @@ fn cpu_seconds() -> f64 {
 
 #[test]
 fn bench() {
-    if std::env::var_os("RESOLVENT_BENCH").is_none() {
+    // "1" for everything, or words of which each must be in a row's name: "cloud_s Survival sample".
+    let Ok(wanted) = std::env::var("RESOLVENT_BENCH") else {
         return;
-    }
+    };
     let grey = |v: f32| Spectrum::rgb(v, v, v);
     let scenes = [
         ("cloud_s", "cloud_s.vdb", grey(24.56)),
@@ -67,6 +96,7 @@ fn bench() {
             "cloud_s.vdb",
             Spectrum::rgb(2.72889, 8.18667, 24.56),
         ),
+        ("cloud_dense", "cloud_s.vdb", grey(200.0)),
         ("smoke", "real/smoke.vdb", grey(1.492)),
     ];
     for (name, file, sigma) in scenes {
@@ -79,9 +109,13 @@ fn bench() {
             let mut stream = Stream::new(1);
             let all: Vec<_> = segments.iter().map(|_| draws(&mut stream)).collect();
             let run = |what: &str, f: &dyn Fn(&Segment, &FlightDraws) -> (f32, u32, u32)| {
+                let row = format!("{name} {choice:?} {what}");
+                if wanted != "1" && !wanted.split(' ').all(|w| row.contains(w)) {
+                    return;
+                }
                 let mut best = f64::MAX;
                 let (mut sum, mut squares, mut lookups, mut ends) = (0.0f64, 0.0f64, 0u64, 0u64);
-                for _ in 0..7 {
+                for _ in 0..15 {
                     (sum, squares, lookups, ends) = (0.0, 0.0, 0, 0);
                     let start = cpu_seconds();
                     for (s, u) in segments.iter().zip(&all) {
@@ -103,6 +137,22 @@ fn bench() {
                     ends as f64 / n
                 );
             };
+            // Paths as an integrator walks them: each flight starts where the one before collided.
+            let row = format!("{name} {choice:?} walk");
+            if wanted == "1" || wanted.split(' ').all(|w| row.contains(w)) {
+                let flights = 1_000_000;
+                let (mut best, mut lookups) = (f64::MAX, 0u64);
+                for _ in 0..9 {
+                    let start = cpu_seconds();
+                    lookups = walk(&*m, &segments, flights);
+                    best = best.min(cpu_seconds() - start);
+                }
+                println!(
+                    "{name:10} {choice:?} walk      {:7.1} ns, {:.2} look-ups",
+                    best * 1e9 / flights as f64,
+                    lookups as f64 / flights as f64
+                );
+            }
             run("sample", &|s, u| {
                 let f = m.sample(s, u);
                 (f.t - s.t0, f.lookups, f.event)
