@@ -50,8 +50,8 @@ pub struct Vertex {
     pub light: u32,
     /// Geometric normal (surfaces; unit).
     pub ng: Float3,
-    /// Zero.
-    pub reserved: u32,
+    /// Which of the medium's phase functions scatters (medium vertices).
+    pub phase: u32,
     /// Unit direction towards the previous vertex.
     pub wo: Float3,
     /// The medium that scatters here (medium vertices), or [`NONE`].
@@ -85,7 +85,7 @@ impl Vertex {
             p_error: [0.0; 3],
             light: NONE,
             ng: [0.0; 3],
-            reserved: 0,
+            phase: 0,
             wo: [0.0; 3],
             medium: NONE,
             frame: Frame {

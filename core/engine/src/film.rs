@@ -152,6 +152,16 @@ impl Buffer {
         Ok(())
     }
 
+    /// The first pixel that has not exactly `count` samples, with what it has.
+    pub fn uneven(&self, count: u32) -> Option<([u32; 2], u32)> {
+        let i = self.pixels.iter().position(|p| p.samples != count)?;
+        let at = [
+            self.min[0] + i as u32 % self.width,
+            self.min[1] + i as u32 / self.width,
+        ];
+        Some((at, self.pixels[i].samples))
+    }
+
     fn end_batch(&mut self) {
         if let Some((x, y)) = self.current
             && self.in_batch > 0
@@ -250,6 +260,11 @@ impl Film {
                 }
             }
         }
+    }
+
+    /// True if no pixel has a sample yet.
+    pub fn is_empty(&self) -> bool {
+        self.pixels.iter().all(|p| p.samples == 0)
     }
 
     /// The estimates of pixel `i`, counted in rows from the top of the window.

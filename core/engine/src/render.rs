@@ -188,7 +188,7 @@ pub fn render(
         None => Ok(rendered),
         Some(why) => Err(Box::new(Broken {
             error: Error::Plugin(why),
-            rendered: (rendered.samples > 0).then(|| Box::new(rendered)),
+            rendered: (!rendered.film.is_empty()).then(|| Box::new(rendered)),
         })),
     }
 }
@@ -226,6 +226,13 @@ fn piece(
     }
     if let Err(f) = result {
         return Err(format!("{}: {}", integrator.title(), f.0));
+    }
+    let wanted = tile.sample_end - tile.sample_begin;
+    if let Some(([x, y], n)) = sink.buffer.uneven(wanted) {
+        let title = integrator.title();
+        return Err(format!(
+            "{title} added {n} samples to pixel ({x}, {y}) instead of {wanted}"
+        ));
     }
     let mut counters = view.counters();
     counters.rejected = sink.buffer.rejected;

@@ -8,8 +8,8 @@ mod load;
 mod registry;
 
 pub use foreign::{ForeignBsdf, ForeignIntegrator, ForeignMedium, ForeignPhase};
-pub(crate) use host::warn;
 pub use host::{Message, set_log};
+pub(crate) use host::{pending_failure, warn};
 pub use instance::Instance;
 pub use load::Plugin;
 pub use registry::Registry;

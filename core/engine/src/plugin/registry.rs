@@ -102,7 +102,15 @@ impl Registry {
         for folder in &self.folders {
             let path = folder.join(&file);
             if path.is_file() {
-                return self.load(kind, &path);
+                let plugin = self.load(kind, &path)?;
+                if plugin.name() != name {
+                    return Err(Error::Plugin(format!(
+                        "{}: calls itself '{}', not '{name}' as its file name says",
+                        path.display(),
+                        plugin.name()
+                    )));
+                }
+                return Ok(plugin);
             }
         }
         let known: Vec<String> = self

@@ -83,7 +83,7 @@ impl Scene {
             let title = m
                 .medium
                 .phases
-                .first()
+                .get(v.phase as usize)
                 .map_or("isotropic scattering".into(), |p| p.title());
             return format!("{title} in the medium '{}' at {:?}:", m.name, v.p);
         }
@@ -255,6 +255,7 @@ impl View<'_> {
         next.p = p.into();
         next.wo = (-d).into();
         next.medium = medium;
+        next.phase = f.phase;
         next.light = NONE;
         next.sigma_t = f.sigma_t;
         next.sigma_s = f.sigma_s;

@@ -1,7 +1,7 @@
 //! The scene as an integrator sees it: the table of functions, counters, and the first error.
 
 use super::{Scene, media};
-use crate::plugin::ForeignMedium;
+use crate::plugin::{ForeignMedium, pending_failure};
 use resolvent_api::abi::{SceneTable, Status, Text, scene_traits};
 use resolvent_api::math::Float3;
 use resolvent_api::operator::FlightDraws;
@@ -299,5 +299,7 @@ unsafe extern "C" fn connect<const SURFACES: bool, const MEDIA: u8>(
 unsafe extern "C" fn fault(ctx: *const c_void, vertex: *const Vertex, message: Text) -> Status {
     // SAFETY: as above.
     let (v, vertex, message) = unsafe { (view(ctx), &*vertex, message.to_owned()) };
-    v.fail(format!("{} {message}", v.scene.scatterer(vertex)))
+    // What the plugin itself said, if it panicked.
+    let why = pending_failure().unwrap_or(message);
+    v.fail(format!("{} {why}", v.scene.scatterer(vertex)))
 }
