@@ -1,0 +1,197 @@
+//! Reflectance and transmittance of slabs, by reciprocity: a camera that looks at the middle of a slab under an upper
+//! hemisphere of radiance 1 sees the reflectance for a beam along its view, and the transmittance with a lower one.
+//!
+//! Both hemispheres are lanes of one environment image, so a rendering gives R, T and R + T from the same paths.
+//!
+//! Values from 5 % of the incident flux up are measured to a standard error of 0.3 % of the value, smaller ones to
+//! 1.5·10⁻⁴ of the incident flux (all rows: from 1 %, to 3·10⁻⁵); those below 10⁻⁴ are bounded only, since they reach
+//! down to 10⁻¹¹⁵.
+
+use crate::harness::{self, Measured, Precision, each, full, hash, number, table};
+use crate::judge::Table;
+use crate::scenes;
+use serde_json::{Value, json};
+
+/// Standard error that is small enough for small values.
+fn small() -> f64 {
+    if full() { 3e-5 } else { 1.5e-4 }
+}
+
+/// Values below are only bounded.
+const UNSEEN: f64 = 1e-4;
+
+/// Half-width that stands for infinity to 1e-4 (thin slabs, low beams) or better.
+fn half_width(tau: f64) -> f64 {
+    if tau < 1.0 { 100.0 } else { 20.0 }
+}
+
+fn view(mu: f64) -> [f64; 3] {
+    [-(1.0 - mu * mu).sqrt(), 0.0, -mu]
+}
+
+struct Case {
+    name: String,
+    scene: Value,
+    /// R and T.
+    exact: [f64; 2],
+}
+
+impl Case {
+    fn precision(&self) -> Precision {
+        let [r, t] = self.exact;
+        Precision::of([r, t, 1.0]).lanes(2).at_least(small())
+    }
+
+    fn judge(&self, m: &Measured, conservative: bool, out: &mut Table) {
+        let p = self.precision();
+        let (mut lanes, mut unseen) = (Vec::new(), Vec::new());
+        for (i, v) in self.exact.into_iter().enumerate() {
+            if v >= UNSEEN {
+                lanes.push((i, v));
+            } else {
+                unseen.push((i, v));
+            }
+        }
+        if conservative {
+            lanes.push((2, 1.0));
+        }
+        out.row(&self.name, m, &lanes, &p);
+        for (i, v) in unseen {
+            out.near(&self.name, m.mean[i], v, 4.0 * p.error[i]);
+        }
+    }
+}
+
+/// The camera over the slab.
+fn beam(e: &Value, mu0: f64) -> Value {
+    let tau = number(e, "tau");
+    let d = view(mu0);
+    let mut s = scenes::scene(
+        [0, 1, 2].map(|i| if i == 2 { 1.0 } else { 0.0 } - 2.0 * d[i]),
+        d,
+    );
+    let slab = scenes::slab(tau, number(e, "albedo"), number(e, "g"), half_width(tau));
+    scenes::medium(&mut s, "slab", slab);
+    s
+}
+
+/// All beams of an entry.
+fn beams(e: &Value, add_light: impl Fn(&mut Value)) -> Vec<Case> {
+    let [tau, albedo, g] = ["tau", "albedo", "g"].map(|k| number(e, k));
+    let each = |b: &Value| {
+        let mu0 = number(b, "mu0");
+        let mut scene = beam(e, mu0);
+        add_light(&mut scene);
+        Case {
+            name: format!("tau {tau} albedo {albedo} g {g} mu0 {mu0}"),
+            scene,
+            exact: [number(b, "R"), number(b, "T")],
+        }
+    };
+    harness::list(e, "beam").iter().map(each).collect()
+}
+
+fn run(name: &'static str, cases: Vec<(Case, bool)>) {
+    let mut out = Table::new(name);
+    let found = each(&cases, |(c, _)| {
+        harness::measure(&c.scene, &c.name, &c.precision())
+    });
+    for ((case, conservative), m) in cases.iter().zip(&found) {
+        case.judge(m, *conservative, &mut out);
+    }
+    out.assert();
+}
+
+/// Default part: every eighth beam by a hash of its name, and the corners of the table (thinnest and thickest slab, albedo
+/// 0.2 and 1, all g, at the steepest and the lowest beam).
+#[test]
+fn slab_flux() {
+    let table = table("slab_flux");
+    let mut cases = Vec::new();
+    for e in harness::list(&table, "entries") {
+        let [tau, albedo] = ["tau", "albedo"].map(|k| number(e, k));
+        for (i, c) in beams(e, |s| scenes::add(s, "lights", scenes::hemispheres(true)))
+            .into_iter()
+            .enumerate()
+        {
+            let corner = (tau == 0.1 || tau == 256.0)
+                && (albedo == 0.2 || albedo == 1.0)
+                && (i == 0 || i == 3);
+            if full() || corner || hash(&c.name).is_multiple_of(8) {
+                cases.push((c, albedo == 1.0));
+            }
+        }
+    }
+    run("slab_flux", cases);
+}
+
+/// The same for isotropic incident light, with a tiny white patch that faces the slab and so shows the mean of the
+/// radiance over the cosine-weighted hemisphere. Default part: every eighth entry.
+#[test]
+fn slab_flux_diffuse() {
+    let table = table("slab_flux");
+    let mut cases = Vec::new();
+    for e in harness::list(&table, "entries") {
+        let [tau, albedo, g] = ["tau", "albedo", "g"].map(|k| number(e, k));
+        let name = format!("tau {tau} albedo {albedo} g {g} diffuse");
+        if !full() && !hash(&name).is_multiple_of(8) {
+            continue;
+        }
+        // The patch is so small that it shades a part of 1e-6 of what it sees, and so low that it sees a part of 1e-7 of
+        // the world beyond the slab's edge.
+        let (low, high, size) = (1.01, 1.02, 2e-5);
+        let mut s = scenes::scene([0.0, 0.0, low], [0.0, 0.0, 1.0]);
+        let w = 3.0 * half_width(tau);
+        scenes::medium(&mut s, "slab", scenes::slab(tau, albedo, g, w));
+        scenes::add(&mut s, "lights", scenes::hemispheres(true));
+        scenes::diffuse(&mut s, "white", json!(1));
+        scenes::add(
+            &mut s,
+            "shapes",
+            json!({
+                "type": "rectangle", "corner": [-0.5 * size, -0.5 * size, high],
+                "edge_u": [0, size, 0], "edge_v": [size, 0, 0], "material": "white"
+            }),
+        );
+        let exact = ["R", "T"].map(|k| number(&e["diffuse"], k));
+        cases.push((
+            Case {
+                name,
+                scene: s,
+                exact,
+            },
+            albedo == 1.0,
+        ));
+    }
+    run("slab_flux_diffuse", cases);
+}
+
+/// Slabs that rest on a Lambertian surface. Its emission of radiance 1, in the second lane, gives by reciprocity the flux
+/// that arrives there.
+#[test]
+fn slab_flux_over_a_surface() {
+    let table = table("slab_flux_lambert_surface");
+    let mut cases = Vec::new();
+    for e in harness::list(&table, "entries") {
+        let w = half_width(number(e, "tau"));
+        let found = beams(e, |s| {
+            scenes::add(s, "lights", scenes::hemispheres(false));
+            scenes::diffuse(s, "ground", e["surface_albedo"].clone());
+            scenes::add(
+                s,
+                "shapes",
+                json!({
+                    "type": "rectangle", "corner": [-w, -w, 0], "edge_u": [2.0 * w, 0, 0],
+                    "edge_v": [0, 2.0 * w, 0], "material": "ground", "emission": [0, 1, 0]
+                }),
+            );
+        });
+        cases.extend(
+            found
+                .into_iter()
+                .enumerate()
+                .filter_map(|(i, c)| (full() || i % 3 == 0).then_some((c, false))),
+        );
+    }
+    run("slab_flux_lambert_surface", cases);
+}
