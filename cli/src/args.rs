@@ -14,7 +14,7 @@ Examples:
   resolvent compare out.exr reference.exr          is the difference more than noise?
   resolvent plugin list                            media, phase functions, materials, integrators
 
-Exit codes: 0 done, 1 something failed, 2 usage or input error, 3 interrupted with the finished part saved.";
+Exit codes: 0 done, 1 something failed, 2 wrong usage, input or plugin, 3 interrupted with the finished part saved.";
 
 /// Physically based rendering of volumes
 #[derive(Debug, Parser)]
@@ -52,7 +52,7 @@ Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctr
 
 /// Options of `render`.
 #[derive(Debug, ClapArgs)]
-#[command(after_help = RENDER_EXAMPLES)]
+#[command(after_help = RENDER_EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
     /// A scene (.json) or an OpenVDB file (.vdb)
     pub input: PathBuf,
@@ -98,7 +98,7 @@ pub struct Render {
     )]
     pub aov: Vec<Layer>,
     /// Exposure of PNG files, in stops
-    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, allow_negative_numbers = true, help_heading = "Picture")]
+    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, help_heading = "Picture")]
     pub exposure: f64,
     /// How PNG files bring large values into the display's range
     #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic, help_heading = "Picture")]

@@ -10,7 +10,7 @@ pub enum Code {
     Done = 0,
     /// Something failed that is not the input's fault.
     Failed = 1,
-    /// Wrong usage or wrong input.
+    /// Wrong usage, or wrong input: a file, a scene, a plugin.
     Input = 2,
     /// Interrupted; what was finished is saved.
     Interrupted = 3,

@@ -1,7 +1,7 @@
 //! The `resolvent` command: renders scenes and volumes, and says what is in files and plugins.
 //!
-//! Results go to standard output, everything else to standard error. Exit codes: 0 done, 1 something failed, 2 usage or
-//! input error, 3 interrupted with the finished part saved.
+//! Results go to standard output, everything else to standard error. Exit codes: 0 done, 1 something failed, 2 wrong
+//! usage, input or plugin, 3 interrupted with the finished part saved.
 
 mod args;
 mod compare;

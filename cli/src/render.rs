@@ -41,7 +41,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     seconds.parse = start.elapsed().as_secs_f64();
     let registry = Registry::new(&a.plugins.plugin_path);
 
-    let built = Scene::build(&described, &registry).map_err(input)?;
+    let built = Scene::build(&described, &registry).map_err(|e| named(a, kind, &e))?;
     let instance = registry
         .instantiate(
             PluginKind::Integrator,
@@ -64,7 +64,8 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let (rendered, broken) = match rendered {
         Ok(rendered) => (rendered, None),
         Err(broken) => {
-            let error = failed(broken.error);
+            // A plugin is the user's input as much as a scene is.
+            let error = input(broken.error);
             match broken.rendered {
                 Some(rendered) => (*rendered, Some(error)),
                 None => return Err(error),
@@ -82,7 +83,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let write_start = Instant::now();
     let (mut image, missing) = output::image(&described, &rendered);
     for layer in missing {
-        console::warning(format!(
+        console::info(format!(
             "the layer '{}' is left out: it takes more samples to know it",
             layer.name()
         ));
@@ -129,6 +130,15 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     }
     console::info(format!("wrote {summary}"));
     Ok(Code::Done)
+}
+
+/// An error of the scene that was guessed for a volume has no place in a file: then it names the volume.
+fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
+    let (text, path) = (error.to_string(), a.input.display().to_string());
+    if kind == Kind::Vdb && !text.contains(&path) {
+        return input(format!("{path}: {text}"));
+    }
+    input(text)
 }
 
 /// The description of what to render.

@@ -330,3 +330,70 @@ fn clip(o: [f64; 3], d: [f64; 3], active: [[i32; 3]; 2]) -> Option<(f64, f64)> {
     }
     (t0 < t1 && t0.is_finite() && t1.is_finite()).then_some((t0, t1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use resolvent_vdb::Tree;
+    use std::path::Path;
+
+    fn data(name: &str) -> File {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../formats/vdb/tests/data");
+        File::open(folder.join(name)).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    /// Against the reader's own interpolation of the whole tree, integrated by Simpson's rule in finer steps.
+    #[test]
+    fn lines_agree_with_the_whole_tree() {
+        for name in [
+            "cloud_s.vdb",
+            "real/smoke_000002.vdb",
+            "corpus/xform_affine_rotscale.vdb",
+            "corpus/tiles_zip.vdb",
+        ] {
+            let file = data(name);
+            let info = &file.grids()[0];
+            let m = measure(&file, info).unwrap().unwrap();
+            let tree = Tree::read(&file, info, &Rayon).unwrap();
+            let transform = info.transform.as_ref().unwrap();
+            for axis in 0..3 {
+                let (lo, hi) = (m.bounds[0][axis], m.bounds[1][axis]);
+                let pad = transform.voxel_size().into_iter().fold(0.0, f64::max);
+                let (lo, hi) = (lo - pad, hi + pad);
+                let n = 40_000;
+                let at = |i: usize| {
+                    let mut p = m.centre;
+                    p[axis] = lo + (hi - lo) * i as f64 / n as f64;
+                    positive(tree.sample(transform.to_index(p).unwrap())[0])
+                };
+                let weight = |i: usize| match i {
+                    0 => 1.0,
+                    i if i == n => 1.0,
+                    i => 2.0 + 2.0 * (i % 2) as f64,
+                };
+                let sum: f64 = (0..=n).map(|i| weight(i) * at(i)).sum();
+                let expected = sum * (hi - lo) / (3 * n) as f64;
+                assert!(
+                    (m.lines[axis] / expected - 1.0).abs() < 2e-3,
+                    "{name} {axis}: {} {expected}",
+                    m.lines[axis]
+                );
+            }
+        }
+    }
+
+    /// A box of one value, of tiles and leaves: its middle is its centre of mass, and its edges its thickness.
+    #[test]
+    fn a_box_of_tiles() {
+        let file = data("corpus/tiles_bigbox.vdb");
+        let info = &file.grids()[0];
+        let m = measure(&file, info).unwrap().unwrap();
+        let [lo, hi] = m.bounds;
+        for axis in 0..3 {
+            let edge = hi[axis] - lo[axis];
+            assert!((m.centre[axis] - 0.5 * (lo[axis] + hi[axis])).abs() < 1e-6 * edge);
+            assert!((m.lines[axis] / (m.max * edge) - 1.0).abs() < 1e-3, "{m:?}");
+        }
+        assert!((m.mean / m.max - 1.0).abs() < 1e-9);
+    }
+}

@@ -61,7 +61,7 @@ fn grid(file: &File, info: &GridInfo) -> (Value, String) {
         "saved_as_half": info.saved_as_half,
         "compression": info.compression.to_string(),
         "instance_of": info.instance_of,
-        "file_bytes": info.range[1].saturating_sub(info.range[0]),
+        "file_range": info.range,
     });
     let mut text = format!(
         "grid {} ({kind}{half}, {}, compression {})\n",
