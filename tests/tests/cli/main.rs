@@ -1,0 +1,12 @@
+//! The program as a user runs it: every test starts the real binary.
+
+mod determinism;
+mod errors;
+mod hostile;
+#[cfg(unix)]
+mod interrupt;
+mod program;
+mod render;
+mod stats;
+mod tools;
+mod volume;
