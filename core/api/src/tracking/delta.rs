@@ -1,9 +1,8 @@
 //! Free flight by delta tracking (Woodcock et al. 1965) with local majorants, minorants and lane densities.
 
-use super::{Draws, STALLS, finish, fold, rescale};
+use super::{Draws, Steps, finish, fold, rescale};
 use crate::medium::Field;
 use crate::operator::{Event, Flight, FlightDraws, Segment, flight_flags};
-use crate::rng::exponential;
 use crate::spectrum::{Lanes, Spectrum};
 
 /// Samples the next collision on a segment.
@@ -21,8 +20,7 @@ pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &Flig
     let (mut value, mut ratio) = (F::Lanes::splat(1.0), F::Lanes::splat(1.0));
     // Logarithms relative to the hero lane's density, which is the common scale.
     let (mut log_value, mut log_ratio) = (zero, zero);
-    let mut tau = exponential(u.tau);
-    let mut stalls = 0;
+    let mut steps = Steps::new(u.tau);
 
     'flight: while let Some(cell) = field.next_cell(&mut cursor) {
         let (majorant, minorant) = (cell.majorant, cell.minorant);
@@ -30,9 +28,7 @@ pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &Flig
         let sure = minorant.lane(u.hero);
         let mut t = cell.t0;
         loop {
-            let step = tau / hero;
-            let leaves = !(t + step < cell.t1);
-            let end = if leaves { cell.t1 } else { t + step };
+            let (end, leaves) = steps.reach(t, hero, cell.t1);
             let dt = end - t;
             if F::EMISSIVE {
                 let position = draws.next();
@@ -50,27 +46,15 @@ pub fn free_flight<F: Field, const RATIO: bool>(field: &F, s: &Segment, u: &Flig
                 log_ratio = log_ratio - (majorant - minorant - F::Lanes::splat(hero)) * dt;
             }
             if leaves {
-                tau = if hero > 0.0 {
-                    (tau - dt * hero).max(0.0)
-                } else {
-                    tau
-                };
+                steps.leave(dt, hero);
                 break;
             }
-            if end == t {
-                stalls += 1;
-                if stalls > STALLS {
-                    stalls = 0;
-                    t = t.next_up();
-                    if !(t < cell.t1) {
-                        break;
-                    }
-                }
-            } else {
-                t = end;
-            }
+            let Some(at) = steps.arrive(t, end, cell.t1) else {
+                break;
+            };
+            t = at;
             let ([event, next], jitter) = draws.next();
-            tau = exponential(next);
+            steps.again(next);
             let mark = event * hero;
             let known = if mark < sure {
                 None

@@ -37,9 +37,65 @@ impl Draws {
     }
 }
 
+/// Exponential steps of a point process along a ray whose rate changes from cell to cell.
+///
+/// What is left of the distance (in units of optical depth) at the end of a cell is carried into the next one.
+pub(crate) struct Steps {
+    tau: f32,
+    stalls: u32,
+}
+
 /// Steps below the resolution of `t` that may follow each other before `t` is moved on by one ulp. A majorant so large
 /// that `t + Δt = t` would otherwise never leave the spot.
-pub(crate) const STALLS: u32 = 64;
+const STALLS: u32 = 64;
+
+impl Steps {
+    /// The first step is decided by the uniform `u`.
+    #[inline(always)]
+    pub(crate) fn new(u: f32) -> Self {
+        Self {
+            tau: crate::rng::exponential(u),
+            stalls: 0,
+        }
+    }
+
+    /// Where the step from `t` ends in a cell of the given rate up to `t1`, and whether that is the cell's end.
+    #[inline(always)]
+    pub(crate) fn reach(&self, t: f32, rate: f32, t1: f32) -> (f32, bool) {
+        let end = t + self.tau / rate;
+        // A rate of 0 gives ∞ or NaN (0/0): either leaves the cell.
+        if end < t1 { (end, false) } else { (t1, true) }
+    }
+
+    /// Leaves a cell after `dt` at `rate`.
+    #[inline(always)]
+    pub(crate) fn leave(&mut self, dt: f32, rate: f32) {
+        if rate > 0.0 {
+            self.tau = (self.tau - dt * rate).max(0.0);
+        }
+    }
+
+    /// Arrives at `end` from `t`: the new `t`, or `None` if it had to be moved on past the cell's end `t1`.
+    #[inline(always)]
+    pub(crate) fn arrive(&mut self, t: f32, end: f32, t1: f32) -> Option<f32> {
+        if end != t {
+            return Some(end);
+        }
+        self.stalls += 1;
+        if self.stalls <= STALLS {
+            return Some(t);
+        }
+        self.stalls = 0;
+        let next = t.next_up();
+        (next < t1).then_some(next)
+    }
+
+    /// The next step is decided by the uniform `u`.
+    #[inline(always)]
+    pub(crate) fn again(&mut self, u: f32) {
+        self.tau = crate::rng::exponential(u);
+    }
+}
 
 /// Keeps products of many factors inside the range of `f32`; their common scale means nothing.
 #[inline(always)]

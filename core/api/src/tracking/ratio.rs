@@ -1,9 +1,8 @@
 //! Transmittance of a connection: residual ratio tracking, and survival of a free flight.
 
-use super::{Draws, STALLS, finish, fold, rescale};
+use super::{Draws, Steps, finish, fold, rescale};
 use crate::medium::Field;
 use crate::operator::{Flight, FlightDraws, Segment};
-use crate::rng::exponential;
 use crate::spectrum::{Lanes, Spectrum};
 
 /// Optical depth beyond which a transmittance is zero in `f32`.
@@ -22,45 +21,29 @@ pub fn transmit<F: Field>(field: &F, s: &Segment, u: &FlightDraws) -> Flight {
     let zero = F::Lanes::splat(0.0);
     let (mut value, mut ratio) = (F::Lanes::splat(1.0), F::Lanes::splat(1.0));
     let (mut log_value, mut log_ratio) = (zero, zero);
-    let mut tau = exponential(u.tau);
-    let mut stalls = 0;
+    let mut steps = Steps::new(u.tau);
 
     while let Some(cell) = field.next_cell(&mut cursor) {
         let residual = cell.majorant - cell.minorant;
         let hero = residual.lane(u.hero);
         let mut t = cell.t0;
         loop {
-            let step = tau / hero;
-            // A residual of 0 gives ∞ or NaN (0/0): either leaves the cell.
-            let leaves = !(t + step < cell.t1);
-            let end = if leaves { cell.t1 } else { t + step };
+            let (end, leaves) = steps.reach(t, hero, cell.t1);
             let dt = end - t;
             log_value = log_value - (cell.majorant - F::Lanes::splat(hero)) * dt;
             if F::Lanes::CHROMATIC {
                 log_ratio = log_ratio - (residual - F::Lanes::splat(hero)) * dt;
             }
             if leaves {
-                tau = if hero > 0.0 {
-                    (tau - dt * hero).max(0.0)
-                } else {
-                    tau
-                };
+                steps.leave(dt, hero);
                 break;
             }
-            if end == t {
-                stalls += 1;
-                if stalls > STALLS {
-                    stalls = 0;
-                    t = t.next_up();
-                    if !(t < cell.t1) {
-                        break;
-                    }
-                }
-            } else {
-                t = end;
-            }
+            let Some(at) = steps.arrive(t, end, cell.t1) else {
+                break;
+            };
+            t = at;
             let ([_, next], jitter) = draws.next();
-            tau = exponential(next);
+            steps.again(next);
             out.lookups += 1;
             out.nulls += 1;
             let sigma = field.extinction(&mut cursor, t, jitter);
