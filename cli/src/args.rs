@@ -1,9 +1,11 @@
 //! The command line.
 
+use crate::failure::{Outcome, input};
 use crate::values::{
     Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, positive, share,
 };
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
+use resolvent_engine::plugin::Registry;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -210,6 +212,19 @@ pub struct PluginPath {
     /// Look for plugins here first, then in RESOLVENT_PLUGIN_PATH and beside the program; may be given several times
     #[arg(long, value_name = "DIR")]
     pub plugin_path: Vec<PathBuf>,
+}
+
+impl PluginPath {
+    /// The plugins in these folders and in those that are always searched.
+    pub fn registry(&self) -> Outcome<Registry> {
+        match self.plugin_path.iter().find(|p| !p.is_dir()) {
+            Some(none) => Err(input(format!(
+                "--plugin-path {}: there is no such folder",
+                none.display()
+            ))),
+            None => Ok(Registry::new(&self.plugin_path)),
+        }
+    }
 }
 
 /// Further layers.

@@ -12,18 +12,18 @@ use std::sync::Arc;
 /// Runs `plugin`.
 pub fn run(a: &Args) -> Outcome {
     match &a.action {
-        PluginAction::List { json, plugins } => list(&Registry::new(&plugins.plugin_path), *json),
+        PluginAction::List { json, plugins } => list(&plugins.registry()?, *json),
         PluginAction::Info {
             name,
             json,
             plugins,
-        } => info(&Registry::new(&plugins.plugin_path), name, *json),
+        } => info(&plugins.registry()?, name, *json),
     }
 }
 
 /// Runs `schema`.
 pub fn schema(a: &Schema) -> Outcome {
-    let registry = Registry::new(&a.plugins.plugin_path);
+    let registry = a.plugins.registry()?;
     let decls: Vec<_> = available(&registry)
         .into_iter()
         .filter_map(|(_, _, plugin)| Some(plugin.ok()?.decl.clone()))

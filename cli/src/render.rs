@@ -39,7 +39,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let mut described = describe(a, kind)?;
     let plan = overrides::apply(a, &mut described)?;
     seconds.parse = start.elapsed().as_secs_f64();
-    let registry = Registry::new(&a.plugins.plugin_path);
+    let registry = a.plugins.registry()?;
 
     let built = Scene::build(&described, &registry).map_err(|e| named(a, kind, &e))?;
     let instance = registry

@@ -72,6 +72,10 @@ fn wrong_options() {
             &["no/such/folder", "no folder"],
         ),
         (&["--stats", "no/such/s.json"], &["no/such"]),
+        (
+            &["--plugin-path", "no/such"],
+            &["--plugin-path no/such", "no such folder"],
+        ),
         (&["--integrator", "pr"], &["'pr'", "did you mean 'pt'"]),
     ] {
         usage(args, words);
