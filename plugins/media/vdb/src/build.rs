@@ -25,7 +25,11 @@ const THICKEST_VOXEL: f64 = 1e6;
 /// Expected null collisions on the way through one brick above which its voxels are visited one by one.
 const ROUGH: f32 = 512.0;
 /// Optical thickness above which connections are estimated by survival.
-const THICK: f32 = 12.0;
+///
+/// Ratio tracking looks at the whole way, survival at a free path. Measured from scattering vertices in a smoke plume, with 400 ns
+/// for the rest of a vertex: at thickness 6 survival makes 1.6 × the efficiency 1/(variance · time), at 2.4 still 1.2 ×, at 0.8
+/// ratio tracking 1.15 ×. (Eight voxels a look-up instead of one take an eighth off the variance and double the time.)
+const THICK: f32 = 1.5;
 /// Groups that are made for emission where there is no density; beyond, emission is sampled by larger regions.
 const EMISSION_GROUPS: usize = 1 << 12;
 

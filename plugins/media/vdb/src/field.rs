@@ -5,7 +5,7 @@ use crate::bounds::{Bounds, BrickCell};
 use crate::coarse::Coarse;
 use crate::cursor::{Cursor, ToLocal, whole};
 use crate::fine::Fine;
-use crate::grid::Grid;
+use crate::grid::{Grid, trilinear};
 use crate::index::{Found, GROUP, UNIFORM, child};
 use crate::voxel::{Voxel, each};
 use glam::Vec3A;
@@ -98,13 +98,20 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> VdbField<L, V, EMISS
         }
     }
 
-    /// The value at `t`, interpolated.
+    /// The value at `t`, interpolated. The position is the one that [`Self::tap`] sees, so that what a tap can hit is never 0
+    /// here.
     #[inline]
     fn exact(&self, walk: &Walk, t: f32) -> f32 {
-        match &walk.fine {
-            Some(fine) => fine.value(&walk.ray, t),
-            None => self.grid.sample(walk.ray.at(t).to_array()),
+        if let Some(fine) = &walk.fine {
+            return fine.value(&walk.ray, t);
         }
+        if !self.grid.trilinear {
+            return self.tap(walk, t, 0);
+        }
+        let p = walk.ray.within(t);
+        let floor = p.floor().min(walk.ray.last());
+        let corners = self.grid.corners(whole(walk.ray.corner() + floor));
+        trilinear(&corners, (p - floor).to_array())
     }
 }
 
@@ -135,7 +142,9 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
     fn next_cell(&self, walk: &mut Walk) -> Option<Cell<L>> {
         loop {
             if let Some(fine) = &mut walk.fine {
-                if let Some((t0, t1, bounds)) = fine.next(&walk.ray, self.sigma.max_lane()) {
+                let vacuum = EMISSIVE && self.appearance.emits(walk.cell);
+                let stretch = fine.next(&walk.ray, self.sigma.max_lane(), vacuum);
+                if let Some((t0, t1, bounds)) = stretch {
                     return Some(self.cell(t0, t1, bounds));
                 }
                 walk.fine = None;
@@ -152,8 +161,8 @@ impl<L: Lanes, V: Voxel<Value = f32>, const EMISSIVE: bool> Field for VdbField<L
                     let BrickCell { bounds, slot } = self.cells[walk.cell];
                     walk.slot = slot;
                     if bounds.min < 0.0 {
-                        let (t0, t1) = ray.enter(1.0);
-                        walk.fine = Some(Fine::new((t0, t1), self.corners(voxel)));
+                        let (t0, _) = ray.enter(1.0);
+                        walk.fine = Some(Fine::new(t0, ray.t, self.corners(voxel)));
                         continue;
                     }
                     let (t0, t1) = ray.enter(8.0);

@@ -22,27 +22,29 @@ const MOST: f32 = 8.0;
 #[derive(Clone, Copy)]
 pub struct Fine {
     t: f32,
-    t1: f32,
+    /// Where the ray leaves the cell; not cut off by the ray's end, on which stretches and bounds must not depend: a shorter
+    /// segment replays the beginning of a longer one.
+    exit: f32,
     corners: [f32; 8],
     bounds: Bounds,
 }
 
 impl Fine {
-    /// The cursor's current cell, which it passes from `t` to `t1`, with the values at its corners.
-    pub fn new((t, t1): (f32, f32), corners: [f32; 8]) -> Self {
+    /// A cell which the ray passes from `t` to `exit`, with the values at its corners.
+    pub fn new(t: f32, exit: f32, corners: [f32; 8]) -> Self {
         Self {
             t,
-            t1,
+            exit,
             corners,
             bounds: Bounds::default(),
         }
     }
 
     /// The next stretch and its bounds along the ray; `None` at the end of the cell. `sigma` is the largest extinction per
-    /// unit of the values.
-    pub fn next(&mut self, ray: &Cursor, sigma: f32) -> Option<(f32, f32, Bounds)> {
-        while self.t < self.t1 {
-            let (start, mut end) = (self.t, self.t1);
+    /// unit of the values; `vacuum` says whether stretches of nothing are wanted, for what else may be there.
+    pub fn next(&mut self, ray: &Cursor, sigma: f32, vacuum: bool) -> Option<(f32, f32, Bounds)> {
+        while self.t < self.exit && self.t < ray.t1 {
+            let (start, mut end) = (self.t, self.exit);
             self.bounds = self.along(ray, start, end);
             while (self.bounds.max - self.bounds.min) * sigma * (end - start) > MOST {
                 let middle = start + 0.5 * (end - start);
@@ -53,8 +55,8 @@ impl Fine {
                 self.bounds = self.along(ray, start, end);
             }
             self.t = end;
-            if self.bounds.max > 0.0 {
-                return Some((start, end, self.bounds));
+            if self.bounds.max > 0.0 || vacuum {
+                return Some((start, end.min(ray.t1), self.bounds));
             }
         }
         None

@@ -298,6 +298,33 @@ impl Index {
         }
     }
 
+    /// True if the layer of a node that touches its neighbour in the direction −`step` consists of `constant`.
+    fn touches(
+        &self,
+        at: [i32; 3],
+        log: u32,
+        step: [usize; 3],
+        constant: u32,
+        patterns: &Patterns,
+    ) -> bool {
+        if let Some(own) = self.constant(at, log, patterns) {
+            return own == constant;
+        }
+        if log == 3 {
+            return true; // a group: see `dilate_group`
+        }
+        let along = |i: usize| if step[i] == 1 { 0..1 } else { 0..8 };
+        let size = 1 << (log - 3);
+        along(0).all(|x| {
+            along(1).all(|y| {
+                along(2).all(|z| {
+                    let below = [at[0] + x * size, at[1] + y * size, at[2] + z * size];
+                    self.touches(below, log - 3, step, constant, patterns)
+                })
+            })
+        })
+    }
+
     /// Gives a uniform entry nodes if its neighbours differ. Uniform regions between uniform regions are alike in many
     /// places, so their nodes are shared: the surface of a large tile costs next to nothing.
     fn settle(
@@ -327,7 +354,7 @@ impl Index {
             match self.constant(there, log, patterns) {
                 Some(constant) => *key = constant,
                 // A group whose touching layer differs has had its neighbour made into a group already.
-                None => mixed |= log > 3,
+                None => mixed |= log > 3 && !self.touches(there, log, step, own, patterns),
             }
         }
         if mixed {

@@ -1,8 +1,12 @@
 //! Tests of the medium.
 
 mod bench;
+mod conformance;
 mod corpus;
+mod emission;
 mod file;
+mod index;
+mod loading;
 mod stress;
 
 use crate::build::{build, build_from};

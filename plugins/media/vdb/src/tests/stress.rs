@@ -170,9 +170,6 @@ fn twelve_decades_in_one_grid() {
                 let what = format!("layer {k}, trilinear {trilinear}, {mode:?}");
                 let (moments, most) = transmittance(&*m, &s, 2000);
                 suite.claim(most <= 1000, || format!("{what}: {most} look-ups"));
-                if mode == Choice::Ratio {
-                    suite.close(&what, moments.mean(), expected, 2e-6, 1e-30);
-                }
                 let (free, most) = survival(&*m, &s, 2000);
                 suite.claim(most <= 1000, || {
                     format!("{what}: {most} look-ups of a flight")
