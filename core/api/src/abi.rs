@@ -397,7 +397,8 @@ pub mod scene_traits {
     pub const SURFACES: u32 = 1;
     /// Has media.
     pub const MEDIA: u32 = 2;
-    /// Some medium's extinction differs between lanes.
+    /// The value of a flight can differ from its density: some medium's extinction differs between lanes, or all media only
+    /// absorb and light fades along the way.
     pub const CHROMATIC_MEDIA: u32 = 4;
     /// Some medium emits.
     pub const EMISSIVE_MEDIA: u32 = 8;

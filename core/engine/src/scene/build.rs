@@ -38,6 +38,10 @@ pub struct Scene {
     pub(crate) accel: Option<Accel>,
     pub(crate) surfaces: Vec<Surface>,
     pub(crate) has_null_surfaces: bool,
+    /// All media absorb only.
+    pub(crate) fades: bool,
+    /// Some medium's extinction differs between lanes.
+    pub(crate) chromatic: bool,
     /// Materials in use.
     pub materials: Vec<Material>,
     /// Media in use.
@@ -213,7 +217,13 @@ impl Scene {
             Filter::new(scene.film.filter),
         );
         let has_null_surfaces = surfaces.iter().any(|s| s.null);
-        let traits = traits(&media, accel.is_some(), &lights, lanes);
+        let fades = media.iter().all(absorbs_only);
+        let chromatic = media.iter().any(|m| is_chromatic(m, lanes));
+        let mut traits = traits(&media, accel.is_some(), &lights);
+        if chromatic || (fades && !media.is_empty()) {
+            // Where light fades, its value is not its density: integrators must not leave both out.
+            traits |= scene_traits::CHROMATIC_MEDIA;
+        }
         let dark = lights.all.is_empty() && traits & scene_traits::EMISSIVE_MEDIA == 0;
         if dark {
             warn("the scene has no light: the picture will be black");
@@ -222,6 +232,8 @@ impl Scene {
             accel,
             surfaces,
             has_null_surfaces,
+            fades,
+            chromatic,
             materials,
             media,
             lights,
@@ -274,6 +286,14 @@ fn material(
         bsdf,
     });
     Ok(materials.len() as u32 - 1)
+}
+
+fn is_chromatic(m: &PlacedMedium, lanes: u32) -> bool {
+    m.medium.info.traits & medium_traits::GREY == 0 && !m.medium.info.sigma_max.is_grey(lanes)
+}
+
+fn absorbs_only(m: &PlacedMedium) -> bool {
+    m.medium.info.traits & medium_traits::ABSORBS_ONLY != 0
 }
 
 fn materials_null(materials: &[Material], m: u32) -> bool {
@@ -403,15 +423,11 @@ fn distant_light(
 }
 
 /// The facts that choose the kernels.
-fn traits(media: &[PlacedMedium], surfaces: bool, lights: &Lights, lanes: u32) -> u32 {
+fn traits(media: &[PlacedMedium], surfaces: bool, lights: &Lights) -> u32 {
     let mut t = 0;
     let mut set = |on: bool, bit: u32| t |= if on { bit } else { 0 };
     set(surfaces, scene_traits::SURFACES);
     set(!media.is_empty(), scene_traits::MEDIA);
-    let chromatic = |m: &PlacedMedium| {
-        m.medium.info.traits & medium_traits::GREY == 0 && !m.medium.info.sigma_max.is_grey(lanes)
-    };
-    set(media.iter().any(chromatic), scene_traits::CHROMATIC_MEDIA);
     let emissive = |m: &PlacedMedium| m.medium.info.traits & medium_traits::EMISSIVE != 0;
     set(media.iter().any(emissive), scene_traits::EMISSIVE_MEDIA);
     let surface_lights = surfaces && !lights.chooser(false).is_empty();

@@ -17,6 +17,9 @@ pub const NONE: u8 = 0;
 pub const ONE: u8 = 1;
 /// Kernels with any media.
 pub const MANY: u8 = 2;
+/// Kernels with media that all absorb only: light fades along the way, where an analogue walk would end in a collision that
+/// scatters nothing. Free flights and connections are then the same technique, of density `track` = `ratio` = 1.
+pub const FADING: u8 = 3;
 
 /// The outcome of a free flight through all media on a segment.
 pub struct Passage {
@@ -59,8 +62,45 @@ impl View<'_> {
                     met: true,
                 })
             }
+            FADING => {
+                let (mut flight, met) = self.fade(s, inside, u)?;
+                if met && self.scene.traits & scene_traits::EMISSIVE_MEDIA != 0 {
+                    flight.emitted = self.glow(s, inside, u)?;
+                }
+                Ok(Passage {
+                    flight,
+                    medium: 0,
+                    met,
+                })
+            }
             _ => self.fly_through_all(s, inside, u),
         }
+    }
+
+    /// Transmittance of media that absorb only, as a flight that always arrives.
+    fn fade(&self, s: &Segment, inside: u64, u: &FlightDraws) -> Result<(Flight, bool), Status> {
+        let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
+        for (i, m) in self.scene.media.iter().enumerate() {
+            let Some(clipped) = within(m, i, inside, s) else {
+                continue;
+            };
+            let flight = self.transmittance(m, &clipped, &keyed(u, i))?;
+            met = true;
+            // An estimate by survival that did not survive has density 0 too.
+            joint.value *= flight
+                .value
+                .zip(flight.ratio, |v, r| if v > 0.0 { v / r } else { 0.0 });
+        }
+        Ok((joint, met))
+    }
+
+    /// Emission on a segment through media that absorb only.
+    fn glow(&self, s: &Segment, inside: u64, u: &FlightDraws) -> Result<Spectrum, Status> {
+        let passage = match self.scene.media.as_slice() {
+            [only] if only.free => self.fly::<ONE>(s, inside, u)?,
+            _ => self.fly_through_all(s, inside, u)?,
+        };
+        Ok(passage.flight.emitted)
     }
 
     fn fly_through_all(
@@ -92,7 +132,7 @@ impl View<'_> {
         // With several emitting media whose lanes differ, a point's lane densities are the product over media, which no
         // medium knows: there the hero speaks for itself alone, which is unbiased too.
         let alone = met > 1
-            && self.scene.traits & scene_traits::CHROMATIC_MEDIA != 0
+            && self.scene.chromatic
             && self.scene.traits & scene_traits::EMISSIVE_MEDIA != 0;
         // Replay everything up to there: the same numbers give the same flight, cut short.
         let mut joint = Flight::vacuum(reached);
@@ -151,6 +191,10 @@ impl View<'_> {
                 };
                 let flight = self.transmittance(m, &clipped, u)?;
                 Ok((!flight.value.is_zero()).then_some((flight, true)))
+            }
+            FADING => {
+                let (flight, met) = self.fade(s, inside, u)?;
+                Ok((!flight.value.is_zero()).then_some((flight, met)))
             }
             _ => {
                 let (mut joint, mut met) = (Flight::vacuum(s.t1), false);

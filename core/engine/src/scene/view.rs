@@ -108,9 +108,11 @@ impl<'s> View<'s> {
         let (emerge, propagate, connect) =
             match (has(scene_traits::SURFACES), has(scene_traits::MEDIA)) {
                 (true, false) => functions::<true, { media::NONE }>(),
+                (true, true) if self.scene.fades => functions::<true, { media::FADING }>(),
                 (true, true) if single => functions::<true, { media::ONE }>(),
                 (true, true) => functions::<true, { media::MANY }>(),
                 (false, false) => functions::<false, { media::NONE }>(),
+                (false, true) if self.scene.fades => functions::<false, { media::FADING }>(),
                 (false, true) if single => functions::<false, { media::ONE }>(),
                 (false, true) => functions::<false, { media::MANY }>(),
             };

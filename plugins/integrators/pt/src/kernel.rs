@@ -67,6 +67,7 @@ impl Kernel<'_> {
         features: bool,
     ) -> Outcome<PixelSample> {
         let mut out = PixelSample::default();
+        let lanes = self.scene.lanes();
         let (film, lens) = sampler.camera();
         let Some(ray) = self.scene.camera_ray(pixel, film, lens)? else {
             return Ok(out);
@@ -90,6 +91,10 @@ impl Kernel<'_> {
             if features {
                 describe(&mut out, next, edge.length);
             }
+        } else if edge.media != 0 {
+            // What absorbs only covers by what it takes away.
+            let clear = edge.value.mean(lanes) / edge.track.mean(lanes);
+            out.alpha = (1.0 - clear).max(0.0);
         }
         out.radiance = if self.sun.is_some() {
             self.follow::<CHROMATIC, true>(walk, sampler, alive, &mut edge, here, next)?
