@@ -17,6 +17,7 @@ pub struct Table {
     rows: Vec<Row>,
     failures: Vec<String>,
     samples: f64,
+    claims: usize,
 }
 
 struct Row {
@@ -36,6 +37,7 @@ impl Table {
             rows: Vec::new(),
             failures: Vec::new(),
             samples: 0.0,
+            claims: 0,
         }
     }
 
@@ -66,13 +68,15 @@ impl Table {
                 text,
                 z: z.z,
                 p: z.p,
-                alone: k == 0,
+                // Rows without noise say nothing about the size of standard errors.
+                alone: k == 0 && error > 10.0 * ARITHMETIC * exact.abs(),
             });
         }
     }
 
     /// Something that must hold.
     pub fn claim(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        self.claims += 1;
         if !holds {
             self.failures.push(what());
         }
@@ -109,9 +113,10 @@ impl Table {
         };
         let worst = self.rows.iter().map(|r| r.z.abs()).fold(0.0, f64::max);
         println!(
-            "{}: {} rows, {n} renderings, {:.2e} samples, worst |z| {worst:.2}, chi2 {chi2:.1}/{n} (p {high:.3}), {:.1} s",
+            "{}: {} rows and {} claims, {n} independent, {:.2e} samples, worst |z| {worst:.2}, chi2 {chi2:.1}/{n} (p {high:.3}), {:.1} s",
             self.name,
             self.rows.len(),
+            self.claims,
             self.samples,
             self.start.elapsed().as_secs_f64()
         );

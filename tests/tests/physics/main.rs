@@ -15,3 +15,4 @@ mod points;
 mod slab_flux;
 mod slab_radiance;
 mod surfaces;
+mod transmittance;

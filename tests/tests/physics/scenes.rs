@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::sync::OnceLock;
 
 /// Field of view of a camera that sees a single ray, degrees.
-const NARROW: f64 = 1e-3;
+const NARROW: f64 = 1e-6;
 
 /// A scene with a camera that sees a single ray; the rest is to be filled in.
 pub fn scene(origin: [f64; 3], direction: [f64; 3]) -> Value {
