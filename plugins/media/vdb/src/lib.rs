@@ -20,7 +20,7 @@
 //! | `emission_grid_scale`, `emission_grid_offset` | float | | 1, 0 | applied to its values |
 //! | `emission` | spectrum ≥ 0 | W·sr⁻¹·m⁻³ | 1 | emission where that grid is 1 |
 //! | `interpolation` | `trilinear`, `nearest` | | `trilinear` | between voxel centres |
-//! | `transmittance` | `auto`, `ratio`, `survival` | | `auto` | estimator of connections; all are unbiased |
+//! | `transmittance` | `auto`, `ratio`, `survival` | | `auto` | estimator of connections; all are unbiased. `auto` takes survival above an optical thickness of 1.5 |
 //! | `phase` | phase plugin | | isotropic | phase function |
 //!
 //! ```json

@@ -183,3 +183,60 @@ fn bench() {
         }
     }
 }
+
+/// Two threads that take tasks from a common counter.
+struct Pair;
+
+impl resolvent_vdb::Parallel for Pair {
+    fn run(&self, count: usize, task: &(dyn Fn(usize) + Sync)) {
+        let next = std::sync::atomic::AtomicUsize::new(0);
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| {
+                    loop {
+                        let i = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                        if i >= count {
+                            return;
+                        }
+                        task(i);
+                    }
+                });
+            }
+        });
+    }
+}
+
+/// Time and memory of loading the file that `RESOLVENT_VDB` names.
+#[test]
+fn bench_load() {
+    let Ok(path) = std::env::var("RESOLVENT_VDB") else {
+        return;
+    };
+    let status = |key: &str| {
+        let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let line = text
+            .lines()
+            .find(|l| l.starts_with(key))
+            .unwrap_or_default();
+        line.split_whitespace()
+            .nth(1)
+            .and_then(|v| v.parse::<f64>().ok())
+            .unwrap_or(f64::NAN)
+            * 1024.0
+    };
+    let before = status("VmRSS");
+    let start = std::time::Instant::now();
+    let services = crate::load::Services {
+        parallel: &Pair,
+        warn: &|w| println!("{w}"),
+    };
+    let m = crate::build::build(&Settings::new(path, "density"), services).unwrap();
+    let info = m.info();
+    println!(
+        "{:.2} s, {:.1} MB active voxels, {:.1} MB held, peak {:.1} MB above the start",
+        start.elapsed().as_secs_f64(),
+        info.voxels as f64 * 4e-6,
+        info.memory as f64 * 1e-6,
+        (status("VmHWM") - before) * 1e-6
+    );
+}

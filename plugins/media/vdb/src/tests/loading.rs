@@ -149,3 +149,35 @@ fn memory_is_the_bricks_and_little_more() {
         }
     }
 }
+
+#[test]
+fn made_from_parameters() {
+    let path = data("corpus/multi_fire.vdb");
+    let with = |more: &str| {
+        let json = format!("{{\"file\": {:?}{more}}}", path.to_string_lossy());
+        resolvent_tests::host::create::<crate::Vdb>(&json)
+    };
+    use resolvent_api::Medium;
+    let p = [2.75, -1.75, 1.875].into();
+    let plain = with("").unwrap().coefficients(p);
+    let changed = with(
+        ", \"sigma_t\": [1, 2, 4], \"albedo\": 0.5, \"density_scale\": 3, \"emission_grid\": \"flame\", \"emission_grid_scale\": 2, \"emission\": [1, 0, 0]",
+    )
+    .unwrap();
+    let c = changed.coefficients(p);
+    assert_eq!(plain.sigma_s.to_rgb(), plain.sigma_t.to_rgb());
+    for (lane, factor) in [3.0f32, 6.0, 12.0].into_iter().enumerate() {
+        assert!((c.sigma_t[lane] / plain.sigma_t[lane] - factor).abs() < 1e-5 * factor);
+        assert_eq!(c.sigma_s[lane], 0.5 * c.sigma_t[lane]);
+    }
+    assert!(c.emission[0] >= 0.0 && c.emission[1] == 0.0);
+    assert_eq!(changed.info().grids_read, 2);
+    assert!(
+        with(", \"grid\": \"smoke\"")
+            .err()
+            .unwrap()
+            .contains("flame")
+    );
+    assert!(with(", \"albedo\": 1.5").is_err());
+    assert!(with(", \"interpolation\": \"cubic\"").is_err());
+}
