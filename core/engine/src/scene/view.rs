@@ -302,6 +302,6 @@ unsafe extern "C" fn fault(ctx: *const c_void, vertex: *const Vertex, message: T
     // SAFETY: as above.
     let (v, vertex, message) = unsafe { (view(ctx), &*vertex, message.to_owned()) };
     // What the plugin itself said, if it panicked.
-    let why = pending_failure().unwrap_or(message);
+    let why = pending_failure().map_or(message.clone(), |own| format!("{message}: {own}"));
     v.fail(format!("{} {why}", v.scene.scatterer(vertex)))
 }
