@@ -74,6 +74,24 @@ impl Table {
         }
     }
 
+    /// Two renderings of what must look the same, lane by lane.
+    pub fn same(&mut self, what: &str, a: &Measured, b: &Measured) {
+        self.samples += a.samples + b.samples;
+        for lane in 0..3 {
+            let error = a.error[lane].hypot(b.error[lane]);
+            let z = z_test(a.mean[lane], error, b.mean[lane], ARITHMETIC);
+            self.rows.push(Row {
+                text: format!(
+                    "{what} [{lane}]: {:.6e} and {:.6e} ± {error:.1e}, z = {:.2}",
+                    a.mean[lane], b.mean[lane], z.z
+                ),
+                z: z.z,
+                p: z.p,
+                alone: false,
+            });
+        }
+    }
+
     /// Something that must hold.
     pub fn claim(&mut self, holds: bool, what: impl FnOnce() -> String) {
         self.claims += 1;

@@ -14,5 +14,8 @@ mod scenes;
 mod points;
 mod slab_flux;
 mod slab_radiance;
+mod stress_media;
+mod stress_places;
+mod stress_world;
 mod surfaces;
 mod transmittance;

@@ -18,7 +18,7 @@ pub const ONE: u8 = 1;
 /// Kernels with any media.
 pub const MANY: u8 = 2;
 /// Kernels with media that all absorb only: light fades along the way, where an analogue walk would end in a collision that
-/// scatters nothing. Free flights and connections are then the same technique, of density `track` = `ratio` = 1.
+/// scatters nothing. Free flights and connections are then the same technique, of the same density: `track` = `ratio`.
 pub const FADING: u8 = 3;
 
 /// The outcome of a free flight through all media on a segment.
@@ -86,10 +86,10 @@ impl View<'_> {
             };
             let flight = self.transmittance(m, &clipped, &keyed(u, i))?;
             met = true;
-            // An estimate by survival that did not survive has density 0 too.
-            joint.value *= flight
-                .value
-                .zip(flight.ratio, |v, r| if v > 0.0 { v / r } else { 0.0 });
+            // The lanes share one estimate, so its density counts lane by lane (one that did not survive has value 0).
+            joint.value *= flight.value;
+            joint.track *= flight.ratio;
+            joint.ratio *= flight.ratio;
         }
         Ok((joint, met))
     }
