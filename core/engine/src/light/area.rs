@@ -183,3 +183,46 @@ fn cone_of(s: &Sphere, d2: f32) -> Option<f32> {
     // sin²/(1 + cos) = 1 − cos without cancellation.
     (sin2 < 1.0).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Accel, Geometry, Ray, Shape, offset_origin};
+    use resolvent_api::rng::Stream;
+
+    /// Points chosen on a sphere are seen from where they were chosen for, to the very limb, and their mean cosine over density
+    /// is the irradiance π r²/d² in closed form.
+    #[test]
+    fn points_on_a_sphere_are_visible() {
+        let sphere = Sphere {
+            center: Vec3::new(0.0, 0.0, 3.0),
+            radius: 1.0,
+        };
+        let area = Area::sphere(0, sphere, Spectrum::ONE);
+        let accel = Accel::build(Geometry {
+            shapes: vec![Shape::Sphere(sphere)],
+        })
+        .unwrap()
+        .unwrap();
+        let mut s = Stream::new(1);
+        let n = 100_000;
+        let (mut hidden, mut refused, mut sum) = (0, 0, 0f64);
+        for _ in 0..n {
+            let Some(p) = area.sample(Vec3::ZERO, s.uniform2()) else {
+                refused += 1;
+                continue;
+            };
+            let at = Vec3::from(p.p);
+            let end = offset_origin(at, p.p_error.into(), p.ng.into(), -at);
+            hidden += u32::from(accel.occluded(&Ray::segment(Vec3::ZERO, end)));
+            sum += f64::from(p.wi[2] / p.density);
+        }
+        let irradiance = sum / f64::from(n);
+        let expected = std::f64::consts::PI / 9.0;
+        assert!(
+            (irradiance / expected - 1.0).abs() < 1e-3,
+            "{irradiance} {expected}, {refused} refused"
+        );
+        assert_eq!((hidden, refused), (0, 0));
+    }
+}
