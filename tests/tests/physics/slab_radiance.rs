@@ -154,6 +154,8 @@ fn half_space() {
             }
             let d = [-(1.0 - mu * mu).sqrt(), 0.0, -mu];
             let mut s = scenes::scene([-2.0 * d[0], 0.0, 1.0 - 2.0 * d[2]], d);
+            // Reflection misses what would go down and up again, emission what comes up only: twice the thickness.
+            let tau = 2.0 * tau;
             let mut slab = scenes::slab(tau, albedo, 0.0, 30.0);
             slab["emission"] = json!(tau * (1.0 - albedo));
             scenes::medium(&mut s, "slab", slab);
