@@ -124,6 +124,8 @@ pub fn scene(path: &Path, a: &Render) -> Outcome<Scene> {
             },
         )]),
         shapes: Vec::new(),
+        prototypes: IndexMap::new(),
+        instances: Vec::new(),
     })
 }
 

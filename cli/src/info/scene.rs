@@ -25,7 +25,7 @@ pub fn report(path: &Path) -> Outcome<Report> {
     };
     let lights: Vec<&str> = scene.lights.iter().map(light).collect();
     let shapes: Vec<&str> = scene.shapes.iter().map(|s| geometry(&s.geometry)).collect();
-    let emitting = scene.shapes.iter().filter(|s| s.emission.is_some()).count();
+    let emitting = scene.all_shapes().filter(|s| s.emission.is_some()).count();
 
     let mut text = format!(
         "{}: scene, {w} x {h} pixels, {budget}, seed {}\n",
@@ -38,8 +38,20 @@ pub fn report(path: &Path) -> Outcome<Report> {
     row("integrator", scene.integrator.plugin.clone());
     row("lights", counted(&lights));
     row("shapes", counted(&shapes));
+    for (name, shapes) in &scene.prototypes {
+        let shapes: Vec<&str> = shapes.iter().map(|s| geometry(&s.geometry)).collect();
+        let copies = scene.instances.iter().filter(|i| i.prototype == *name);
+        row(
+            "prototype",
+            format!(
+                "{name} ({}), {} instances",
+                counted(&shapes),
+                copies.count()
+            ),
+        );
+    }
     if emitting > 0 {
-        row("", format!("{emitting} of them emit"));
+        row("", format!("{emitting} shapes emit"));
     }
     for (name, block) in &scene.materials {
         row("material", format!("{name} ({})", block.plugin));
@@ -78,6 +90,8 @@ pub fn report(path: &Path) -> Outcome<Report> {
         "lights": lights,
         "shapes": shapes,
         "emitting_shapes": emitting,
+        "prototypes": scene.prototypes.iter().map(|(n, s)| json!({"name": n, "shapes": s.len()})).collect::<Vec<_>>(),
+        "instances": scene.instances.len(),
         "materials": scene.materials.iter().map(|(n, b)| json!({"name": n, "plugin": b.plugin})).collect::<Vec<_>>(),
         "media": scene.media.iter().map(|(n, m)| json!({"name": n, "plugin": m.block.plugin})).collect::<Vec<_>>(),
         "plugins": plugins.iter().map(|p| json!({"kind": p.kind, "name": p.name, "path": p.found})).collect::<Vec<_>>(),
@@ -165,7 +179,7 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
             add(file);
         }
     }
-    for s in &scene.shapes {
+    for s in scene.all_shapes() {
         if let Geometry::Ply { file, .. } = &s.geometry {
             add(file);
         }

@@ -66,14 +66,17 @@ impl<'d> Checker<'d> {
                 }
             }
             Kind::Number(range) => self.number(node, range),
-            Kind::Integer(min, max) => self.integer(node, min, max),
+            Kind::Integer(min, max) => self.integer(node, min.into(), max.into()),
+            Kind::Signed(min, max) => self.integer(node, min.into(), max.into()),
             Kind::Integers(count, min, max) => {
                 if let Some(items) = self.list(
                     node,
                     &format!("a list of {count} whole numbers"),
                     Some(count),
                 ) {
-                    items.iter().for_each(|item| self.integer(item, min, max));
+                    items
+                        .iter()
+                        .for_each(|item| self.integer(item, min.into(), max.into()));
                 }
             }
             Kind::Text => {
@@ -172,9 +175,9 @@ impl<'d> Checker<'d> {
         }
     }
 
-    fn integer(&mut self, node: &Node, min: u64, max: u64) {
+    fn integer(&mut self, node: &Node, min: i128, max: i128) {
         match self.doc.integer(node) {
-            Some(i) if i >= i128::from(min) && i <= i128::from(max) => {}
+            Some(i) if i >= min && i <= max => {}
             _ => self.mismatch(node, &format!("a whole number in [{min}, {max}]")),
         }
     }

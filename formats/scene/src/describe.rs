@@ -36,8 +36,12 @@ pub struct Scene {
     pub materials: IndexMap<String, PluginBlock>,
     /// Media by name. A medium that no shape names as its interior stands free.
     pub media: IndexMap<String, Medium>,
-    /// All surfaces.
+    /// All surfaces that stand in the world once.
     pub shapes: Vec<Shape>,
+    /// Groups of surfaces in a space of their own, by name: they appear in the world by [`Scene::instances`] alone.
+    pub prototypes: IndexMap<String, Vec<Shape>>,
+    /// Copies of prototypes.
+    pub instances: Vec<Instance>,
 }
 
 /// The scene file: errors name it, and relative paths start from its folder.
@@ -65,11 +69,15 @@ impl Scene {
         self.base().join(path)
     }
 
+    /// The shapes of the world, then those of the prototypes.
+    pub fn all_shapes(&self) -> impl Iterator<Item = &Shape> {
+        self.shapes.iter().chain(self.prototypes.values().flatten())
+    }
+
     /// The media that fill space by their own bounds: those which are no shape's interior.
     pub fn free_standing(&self) -> impl Iterator<Item = (&str, &Medium)> {
         let interiors: HashSet<&str> = self
-            .shapes
-            .iter()
+            .all_shapes()
             .filter_map(|s| s.interior.as_deref())
             .collect();
         self.media
@@ -336,6 +344,21 @@ pub struct Shape {
     pub emission: Option<Vec3>,
     /// Name in [`Scene::media`] of what fills it; for closed shapes only.
     pub interior: Option<String>,
+    /// Where closed shapes overlap that refract or have an interior, those of the highest priority fill the overlap, and the
+    /// surfaces of the others are not there (Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images"). Media
+    /// of equal priority superpose.
+    pub priority: i32,
+}
+
+/// A copy of a prototype.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// Name in [`Scene::prototypes`].
+    pub prototype: String,
+    /// The prototype's space to world; it may stretch, shear and mirror.
+    pub transform: Transform,
+    /// Name in [`Scene::materials`] of what replaces the material of every shape of the prototype.
+    pub material: Option<String>,
 }
 
 /// Where a surface is. The outer side is the one the normal points to.

@@ -98,8 +98,10 @@ fn short(x: f64) -> String {
 pub(crate) enum Kind {
     Bool,
     Number(Range),
-    /// A whole number.
+    /// A whole number, not negative.
     Integer(u64, u64),
+    /// A whole number of either sign.
+    Signed(i64, i64),
     /// So many whole numbers.
     Integers(usize, u64, u64),
     /// Any text.
@@ -231,10 +233,37 @@ pub(crate) static SCENE: Object = Object {
             Kind::Named(&Kind::Object(&MEDIUM)),
             "Media by name; free-standing unless a shape's interior",
         ),
+        may("shapes", SHAPES, "Surfaces"),
         may(
-            "shapes",
-            Kind::List(&Kind::Variants(&[&SPHERE, &RECTANGLE, &MESH, &PLY])),
-            "Surfaces",
+            "prototypes",
+            Kind::Named(&SHAPES),
+            "Lists of surfaces by name, to be placed by instances",
+        ),
+        may(
+            "instances",
+            Kind::List(&Kind::Object(&INSTANCE)),
+            "Copies of prototypes",
+        ),
+    ],
+    rules: &[],
+};
+
+const SHAPES: Kind = Kind::List(&Kind::Variants(&[&SPHERE, &RECTANGLE, &MESH, &PLY]));
+
+static INSTANCE: Object = Object {
+    name: "instance",
+    help: "A copy of a prototype",
+    fields: &[
+        need("prototype", Kind::Name, "Name of the prototype"),
+        may(
+            "transform",
+            Kind::Transform,
+            "The prototype's space to world",
+        ),
+        may(
+            "material",
+            Kind::Name,
+            "Name of the material that replaces those of the prototype",
         ),
     ],
     rules: &[],
@@ -485,6 +514,11 @@ const EMISSION: Field = may(
     "Radiance emitted from the outer side: one number or RGB",
 );
 const INTERIOR: Field = may("interior", Kind::Name, "Name of the medium that fills it");
+const PRIORITY: Field = may(
+    "priority",
+    Kind::Signed(-1_000_000, 1_000_000),
+    "Which of overlapping closed shapes that refract or have an interior fills the overlap: the highest (0)",
+);
 const TO_WORLD: Field = may("transform", Kind::Transform, "The shape's space to world");
 
 static SPHERE: Object = Object {
@@ -496,6 +530,7 @@ static SPHERE: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         INTERIOR,
+        PRIORITY,
     ],
     rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
 };
@@ -517,6 +552,7 @@ static RECTANGLE: Object = Object {
         ),
         MATERIAL_NAME,
         EMISSION,
+        PRIORITY,
     ],
     rules: &[Rule::AtLeastOne(&["material", "emission"])],
 };
@@ -537,6 +573,7 @@ static MESH: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         INTERIOR,
+        PRIORITY,
     ],
     rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
 };
@@ -554,6 +591,7 @@ static PLY: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         INTERIOR,
+        PRIORITY,
     ],
     rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
 };

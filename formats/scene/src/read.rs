@@ -111,26 +111,48 @@ impl Reader<'_> {
                 .collect::<Option<_>>()?,
             materials: named(root, "materials", |n| self.block(n))?,
             media: named(root, "media", |n| self.medium(n))?,
-            shapes: list(root, "shapes")
+            shapes: self.shapes(list(root, "shapes"))?,
+            prototypes: named(root, "prototypes", |n| {
+                if items(n).is_empty() {
+                    self.checker.report(n, "expected at least one shape");
+                }
+                self.shapes(items(n))
+            })?,
+            instances: list(root, "instances")
                 .iter()
-                .map(|n| self.shape(n))
+                .map(instance)
                 .collect::<Option<_>>()?,
         };
-        for (node, shape) in list(root, "shapes").iter().zip(&scene.shapes) {
-            self.known(
-                node.get("material"),
-                shape.material.as_deref(),
-                "material",
-                &scene.materials,
-            );
-            self.known(
-                node.get("interior"),
-                shape.interior.as_deref(),
-                "medium",
-                &scene.media,
-            );
-        }
+        self.references(root, &scene);
         Some(scene)
+    }
+
+    /// Reports names of materials, media and prototypes that nothing has.
+    fn references(&mut self, root: &Node, scene: &Scene) {
+        let prototypes = match root.get("prototypes").map(|n| &n.data) {
+            Some(Data::Object(members)) => members.as_slice(),
+            _ => &[],
+        };
+        let nodes = prototypes.iter().flat_map(|m| items(&m.value));
+        for (node, shape) in list(root, "shapes")
+            .iter()
+            .chain(nodes)
+            .zip(scene.all_shapes())
+        {
+            let (material, interior) = (shape.material.as_deref(), shape.interior.as_deref());
+            self.known(node.get("material"), material, "material", &scene.materials);
+            self.known(node.get("interior"), interior, "medium", &scene.media);
+        }
+        for (node, instance) in list(root, "instances").iter().zip(&scene.instances) {
+            let (prototype, material) = (&instance.prototype, instance.material.as_deref());
+            self.known(
+                node.get("prototype"),
+                Some(prototype),
+                "prototype",
+                &scene.prototypes,
+            );
+            self.known(node.get("material"), material, "material", &scene.materials);
+        }
     }
 
     /// Reports a name that nothing has.
@@ -337,6 +359,10 @@ impl Reader<'_> {
         })
     }
 
+    fn shapes(&mut self, nodes: &[Node]) -> Option<Vec<Shape>> {
+        nodes.iter().map(|n| self.shape(n)).collect()
+    }
+
     fn shape(&mut self, node: &Node) -> Option<Shape> {
         let geometry = match text(node, "type")? {
             "sphere" => Geometry::Sphere {
@@ -363,6 +389,10 @@ impl Reader<'_> {
             material: text(node, "material").map(String::from),
             emission: spectrum(node, "emission"),
             interior: text(node, "interior").map(String::from),
+            priority: match node.get("priority") {
+                Some(n) => self.checker.doc.integer(n)?.try_into().ok()?,
+                None => 0,
+            },
         })
     }
 
@@ -498,9 +528,21 @@ fn named<T>(
     }
 }
 
+fn instance(node: &Node) -> Option<Instance> {
+    Some(Instance {
+        prototype: text(node, "prototype")?.into(),
+        transform: to_world(node)?,
+        material: text(node, "material").map(String::from),
+    })
+}
+
 fn list<'n>(node: &'n Node, key: &str) -> &'n [Node] {
-    match node.get(key).map(|n| &n.data) {
-        Some(Data::List(items)) => items,
+    node.get(key).map_or(&[], items)
+}
+
+fn items(node: &Node) -> &[Node] {
+    match &node.data {
+        Data::List(items) => items,
         _ => &[],
     }
 }

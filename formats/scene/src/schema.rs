@@ -58,6 +58,7 @@ impl Builder<'_> {
             Kind::Bool => json!({"type": "boolean"}),
             Kind::Number(range) => number(range),
             Kind::Integer(min, max) => json!({"type": "integer", "minimum": min, "maximum": max}),
+            Kind::Signed(min, max) => json!({"type": "integer", "minimum": min, "maximum": max}),
             Kind::Integers(count, min, max) => {
                 json!({"type": "array", "minItems": count, "maxItems": count,
                        "items": {"type": "integer", "minimum": min, "maximum": max}})

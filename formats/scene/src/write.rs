@@ -59,7 +59,8 @@ impl Scene {
                 rebase.path(file);
             }
         }
-        for shape in &mut self.shapes {
+        let shapes = self.shapes.iter_mut();
+        for shape in shapes.chain(self.prototypes.values_mut().flatten()) {
             if let Geometry::Ply { file, .. } = &mut shape.geometry {
                 rebase.path(file);
             }
@@ -98,6 +99,18 @@ impl Scene {
                 .collect(),
         );
         root["shapes"] = self.shapes.iter().map(shape).collect();
+        if !self.prototypes.is_empty() {
+            let shapes = |s: &Vec<Shape>| s.iter().map(shape).collect();
+            root["prototypes"] = Json::Object(
+                self.prototypes
+                    .iter()
+                    .map(|(name, s)| (name.clone(), shapes(s)))
+                    .collect(),
+            );
+        }
+        if !self.instances.is_empty() {
+            root["instances"] = self.instances.iter().map(instance).collect();
+        }
         root
     }
 }
@@ -314,6 +327,18 @@ fn shape(s: &Shape) -> Json {
     }
     if let Some(interior) = &s.interior {
         out["interior"] = json!(interior);
+    }
+    if s.priority != 0 {
+        out["priority"] = json!(s.priority);
+    }
+    out
+}
+
+fn instance(i: &Instance) -> Json {
+    let mut out = json!({"prototype": i.prototype});
+    put_transform(&mut out, &i.transform);
+    if let Some(material) = &i.material {
+        out["material"] = json!(material);
     }
     out
 }

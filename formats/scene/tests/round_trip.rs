@@ -138,6 +138,20 @@ fn every_key_arrives() {
             transform: Transform::IDENTITY
         }
     );
+    let priorities: Vec<i32> = s.all_shapes().map(|s| s.priority).collect();
+    assert_eq!(priorities, [0, 0, 0, -2, 0, 3]);
+    assert_eq!(s.prototypes["stone"].len(), 2);
+    assert_eq!(
+        s.instances[0],
+        Instance {
+            prototype: "stone".into(),
+            transform: Transform::IDENTITY,
+            material: None
+        }
+    );
+    assert_eq!(s.instances[1].material.as_deref(), Some("floor"));
+    let moved = s.instances[1].transform.point([1.0; 3]);
+    assert_eq!(moved, [6.0, -2.0, 3.0]);
     assert_eq!(s.resolve("bunny.ply"), PathBuf::from("scenes/bunny.ply"));
     assert_eq!(
         s.resolve("/data/bunny.ply"),
@@ -153,6 +167,7 @@ fn what_is_left_out_has_its_default() {
     assert_eq!(s.sampling, Sampling::default());
     assert_eq!(s.integrator, PluginBlock::new("pt"));
     assert!(s.lights.is_empty() && s.shapes.is_empty() && s.media.is_empty());
+    assert!(s.prototypes.is_empty() && s.instances.is_empty());
     assert_eq!(s.camera.to_world().point([0.0, 0.0, -1.0]), [0.0, 0.0, 4.0]);
 }
 
@@ -246,6 +261,7 @@ fn large_meshes_are_written_line_by_line() {
         material: None,
         emission: Some([1.0; 3]),
         interior: None,
+        priority: 0,
     };
     scene.shapes.push(shape);
     let text = scene.to_text().unwrap();
@@ -277,6 +293,10 @@ fn files_are_written_read_and_moved() {
         "sub/./my/libglass.so"
     );
     assert_eq!(moved.resolve(file), dir.join("sub/bunny.ply"));
+    let Geometry::Ply { file, .. } = &moved.prototypes["stone"][0].geometry else {
+        panic!()
+    };
+    assert_eq!(file, "sub/stone.ply");
 
     // Out of the folder: no relative path is known to lead back, so it becomes absolute.
     scene

@@ -86,6 +86,13 @@ fn edits() -> Vec<(&'static str, Value)> {
         ("/shapes/2/indices", json!([[0, 1]])),
         ("/shapes/2/uvs", json!([[0, 1, 2]])),
         ("/shapes/3/file", json!(7)),
+        ("/shapes/3/priority", json!(0.5)),
+        ("/prototypes/stone/0/file", json!(7)),
+        ("/prototypes/stone", json!({})),
+        ("/instances/0", json!({})),
+        ("/instances/0/prototype", json!("")),
+        ("/instances/1/transform", json!([{"scael": 1}])),
+        ("/instances/1/interior", json!("fog")),
         ("/nothing", json!(7)),
     ]
 }

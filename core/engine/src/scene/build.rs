@@ -66,6 +66,9 @@ impl Scene {
     pub fn build(scene: &describe::Scene, registry: &Registry) -> Result<Self> {
         let start = Instant::now();
         let lanes = RGB_LANES;
+        if !scene.instances.is_empty() {
+            return Err(Error::Input("instances cannot be traced".into()));
+        }
         let wide: Vec<Wide> = scene
             .shapes
             .iter()

@@ -49,7 +49,17 @@ pub const FULL: &str = r#"{
      "normals": [[0, 0, 1], [0, 0, 1], [0, 0, 1]], "uvs": [[0, 0], [1, 0], [0, 1]],
      "transform": [{"scale": 2}, {"rotate_deg": {"axis": [1, 1, 0], "angle": 90}}, {"translate": [0, 0, 5]}],
      "material": "with a blank"},
-    {"type": "ply", "file": "bunny.ply", "material": "floor", "interior": "fog"}
+    {"type": "ply", "file": "bunny.ply", "material": "floor", "interior": "fog", "priority": -2}
+  ],
+  "prototypes": {
+    "stone": [
+      {"type": "ply", "file": "stone.ply", "material": "floor"},
+      {"type": "sphere", "center": [0, 0, 0], "radius": 0.1, "interior": "fog", "priority": 3}
+    ]
+  },
+  "instances": [
+    {"prototype": "stone"},
+    {"prototype": "stone", "transform": [{"scale": [1, -2, 3]}, {"translate": [5, 0, 0]}], "material": "floor"}
   ]
 }
 "#;
