@@ -362,7 +362,7 @@ pub struct PhaseTable {
     pub create: Create,
     /// Ends it.
     pub destroy: Destroy,
-    /// [`crate::PhaseFunction::closure`].
+    /// [`crate::PhaseFunction::closure`]. The closure may point into the instance: no function of it is called after `destroy`.
     pub closure: unsafe extern "C" fn(
         instance: *const c_void,
         at: *const MediumPoint,

@@ -16,7 +16,7 @@ pub struct Closure {
 }
 
 // SAFETY: the table is a static of a library that is never unloaded, and the data is that of a type the SDK bounds
-// by `Copy + Send + Sync + 'static`.
+// by `Copy + Send + Sync`; what it borrows from its instance is alive by the contract of `store`.
 unsafe impl Send for Closure {}
 // SAFETY: as above.
 unsafe impl Sync for Closure {}
@@ -31,8 +31,9 @@ impl Closure {
     /// Stores `value` with its table into `out`. Checked at compile time: it must fit in size and alignment.
     ///
     /// # Safety
-    /// `table` must be the table made for `C` by the SDK, `out` valid for writing.
-    pub unsafe fn store<C: Copy + 'static>(out: *mut Self, table: *const ScatterTable, value: C) {
+    /// `table` must be the table made for `C` by the SDK, whatever the lifetimes in it, `out` valid for writing; what `value`
+    /// borrows must outlive every use of `out`.
+    pub unsafe fn store<C: Copy>(out: *mut Self, table: *const ScatterTable, value: C) {
         const {
             assert!(
                 size_of::<C>() <= CLOSURE_BYTES,

@@ -299,7 +299,9 @@ impl<T: Plugin + Medium> MediumShim<T> {
 pub struct PhaseShim<T>(PhantomData<T>);
 
 impl<T: Plugin + PhaseFunction> PhaseShim<T> {
-    const SCATTER: &'static ScatterTable = &ScatterShim::<T::Closure>::TABLE;
+    /// Functions are the same for every lifetime of the closure, so those of the longest stand for all. The borrow is kept by
+    /// the ABI instead: see [`PhaseTable::closure`].
+    const SCATTER: &'static ScatterTable = &ScatterShim::<T::Closure<'static>>::TABLE;
 
     /// The table.
     pub const TABLE: PhaseTable = PhaseTable {

@@ -51,7 +51,7 @@ impl Plugin for HenyeyGreenstein {
 }
 
 impl PhaseFunction for HenyeyGreenstein {
-    type Closure = Self;
+    type Closure<'a> = Self;
 
     fn closure(&self, _: &MediumPoint) -> Self {
         *self

@@ -35,7 +35,7 @@ impl Plugin for Isotropic {
 }
 
 impl PhaseFunction for Isotropic {
-    type Closure = Self;
+    type Closure<'a> = Self;
 
     fn closure(&self, _: &MediumPoint) -> Self {
         Self

@@ -67,7 +67,7 @@ impl Plugin for TwoLobes {
 }
 
 impl PhaseFunction for TwoLobes {
-    type Closure = Self;
+    type Closure<'a> = Self;
 
     fn closure(&self, _: &MediumPoint) -> Self {
         *self
