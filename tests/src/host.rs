@@ -2,9 +2,11 @@
 
 use core::ffi::c_void;
 use resolvent_api::abi::{
-    CreateArgs, HostTable, ParamDecl, ParamKind, ParamValue, Task, Text, param_flags,
+    BsdfTable, CreateArgs, HostTable, ParamDecl, ParamKind, ParamValue, PluginHeader, Task, Text,
+    param_flags,
 };
-use resolvent_api::{Affine, Params, Plugin};
+use resolvent_api::export::{BsdfShim, header};
+use resolvent_api::{Affine, Bsdf, Params, Plugin, PluginKind};
 use serde_json::Value;
 
 /// An instance of `T` with the given parameters (a JSON object), three lanes and no transform.
@@ -20,6 +22,60 @@ pub fn create<T: Plugin>(params: &str) -> Result<T, String> {
 /// # Errors
 /// As [`create`].
 pub fn create_at<T: Plugin>(params: &str, to_world: &Affine) -> Result<T, String> {
+    with_args::<T, _>(params, to_world, &[], |args| {
+        // SAFETY: the arguments are valid for the call.
+        T::create(&unsafe { Params::new(args) }).map_err(|e| e.0)
+    })
+}
+
+/// As [`create`], with BSDFs nested in it: the parameters of those names.
+///
+/// # Errors
+/// As [`create`].
+pub fn create_with<T: Plugin>(params: &str, nested: &[(&str, Nested)]) -> Result<T, String> {
+    with_args::<T, _>(params, &Affine::IDENTITY, nested, |args| {
+        // SAFETY: the arguments are valid for the call.
+        T::create(&unsafe { Params::new(args) }).map_err(|e| e.0)
+    })
+}
+
+/// An instance to be nested in another. It is never destroyed: tests end soon enough.
+#[derive(Clone, Copy)]
+pub struct Nested {
+    header: &'static PluginHeader,
+    instance: *const c_void,
+}
+
+impl Nested {
+    /// An instance of the BSDF plugin `T` with BSDFs nested in it, made across the boundary as a host makes it.
+    ///
+    /// # Errors
+    /// As [`create`].
+    pub fn bsdf<T: Plugin + Bsdf>(params: &str, nested: &[(&str, Self)]) -> Result<Self, String> {
+        let table: &'static BsdfTable = Box::leak(Box::new(BsdfShim::<T>::TABLE));
+        let header = header::<T>(PluginKind::Bsdf, "0.0.0", core::ptr::from_ref(table).cast());
+        let instance = with_args::<T, _>(params, &Affine::IDENTITY, nested, |args| {
+            // SAFETY: the arguments are valid for the call.
+            let instance = unsafe { (table.create)(args) };
+            if instance.is_null() {
+                return Err("the nested BSDF refuses".to_owned());
+            }
+            Ok(instance)
+        })?;
+        Ok(Self {
+            header: Box::leak(Box::new(header)),
+            instance,
+        })
+    }
+}
+
+/// Calls `make` with the arguments that a host would pass to `create`.
+fn with_args<T: Plugin, R>(
+    params: &str,
+    to_world: &Affine,
+    nested: &[(&str, Nested)],
+    make: impl FnOnce(&CreateArgs) -> Result<R, String>,
+) -> Result<R, String> {
     let given: Value = serde_json::from_str(params).map_err(|e| e.to_string())?;
     let given = given.as_object().ok_or("parameters are a JSON object")?;
     // SAFETY: declarations hold static texts.
@@ -33,6 +89,10 @@ pub fn create_at<T: Plugin>(params: &str, to_world: &Affine) -> Result<T, String
     let mut held = Vec::new();
     for decl in T::PARAMS {
         let name = name_of(decl);
+        if nested.iter().any(|(n, _)| *n == name) {
+            held.push((decl.kind, (vec![], String::new()), name));
+            continue;
+        }
         // SAFETY: as above.
         let default = unsafe { decl.default.to_owned() };
         let value = match given.get(&name) {
@@ -53,14 +113,17 @@ pub fn create_at<T: Plugin>(params: &str, to_world: &Affine) -> Result<T, String
     }
     let values: Vec<ParamValue> = held
         .iter()
-        .map(|(kind, (numbers, text), name)| ParamValue {
-            name: Text::new(name),
-            kind: *kind,
-            count: numbers.len() as u32,
-            numbers: numbers.as_ptr(),
-            text: Text::new(text),
-            header: core::ptr::null(),
-            instance: core::ptr::null(),
+        .map(|(kind, (numbers, text), name)| {
+            let inner = nested.iter().find(|(n, _)| n == name).map(|(_, i)| i);
+            ParamValue {
+                name: Text::new(name),
+                kind: *kind,
+                count: numbers.len() as u32,
+                numbers: numbers.as_ptr(),
+                text: Text::new(text),
+                header: inner.map_or(core::ptr::null(), |i| core::ptr::from_ref(i.header)),
+                instance: inner.map_or(core::ptr::null(), |i| i.instance),
+            }
         })
         .collect();
     let args = CreateArgs {
@@ -72,8 +135,7 @@ pub fn create_at<T: Plugin>(params: &str, to_world: &Affine) -> Result<T, String
         lanes: 3,
         reserved: 0,
     };
-    // SAFETY: everything `args` points to lives until the end of this function.
-    T::create(&unsafe { Params::new(&args) }).map_err(|e| e.0)
+    make(&args)
 }
 
 /// Numbers and text of a value, checked against its declaration.

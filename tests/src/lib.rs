@@ -12,6 +12,8 @@ pub mod chi2;
 pub mod host;
 pub mod medium;
 pub mod moments;
+#[cfg(test)]
+mod nesting;
 pub mod quadrature;
 pub mod scatter;
 mod suite;

@@ -308,6 +308,8 @@ pub struct ScatterTable {
     ) -> Status,
     /// [`crate::Scatter::lobes`].
     pub lobes: unsafe extern "C" fn(data: *const c_void) -> u32,
+    /// [`crate::Scatter::eta`]; null: 1.
+    pub eta: Option<unsafe extern "C" fn(data: *const c_void) -> f32>,
 }
 
 /// Functions of a medium, see [`crate::Medium`].
@@ -389,6 +391,8 @@ pub struct BsdfTable {
         at: *const SurfacePoint,
         out: *mut Closure,
     ) -> Status,
+    /// [`crate::Bsdf::ior`]; null: 1.
+    pub ior: Option<unsafe extern "C" fn(instance: *const c_void) -> f32>,
 }
 
 /// Facts about the scene that an integrator may choose its kernel by; bits of [`SceneTable::traits`].

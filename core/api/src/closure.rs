@@ -4,8 +4,9 @@ use crate::abi::{ScatterTable, Status};
 use crate::math::Vec3;
 use crate::operator::{Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample};
 
-/// Bytes a closure may occupy.
-pub const CLOSURE_BYTES: usize = 240;
+/// Bytes a closure may occupy. Only those in use are ever written or copied by the SDK, so a small closure doesn't pay for a
+/// large one; the bound leaves room for two closures of 216 bytes nested in a third ([`crate::nested`]).
+pub const CLOSURE_BYTES: usize = 496;
 
 /// The data of a `Scatter` implementation together with the table of its functions.
 #[repr(C)]
@@ -22,6 +23,15 @@ unsafe impl Send for Closure {}
 unsafe impl Sync for Closure {}
 
 impl Closure {
+    /// Addresses of the functions and the data of a closure that a plugin wrote, of which the rest need not be initialised.
+    ///
+    /// # Safety
+    /// `closure` must point to a closure whose table was written.
+    pub(crate) unsafe fn parts(closure: *const Self) -> (*const ScatterTable, *const u64) {
+        // SAFETY: by contract.
+        unsafe { ((*closure).table, (&raw const (*closure).data).cast()) }
+    }
+
     /// Absorbs everything.
     pub const EMPTY: Self = Self {
         table: core::ptr::null(),
@@ -37,7 +47,7 @@ impl Closure {
         const {
             assert!(
                 size_of::<C>() <= CLOSURE_BYTES,
-                "a closure may occupy at most 240 bytes"
+                "a closure may occupy at most 496 bytes"
             )
         };
         const {
@@ -110,6 +120,24 @@ impl Closure {
     }
 }
 
+/// [`Scatter::eta`] of a closure's data; 1 without a table, or where the table doesn't say.
+///
+/// # Safety
+/// `table` must be null or valid, and `data` of its kind.
+#[inline(always)]
+pub(crate) unsafe fn eta_of(table: *const ScatterTable, data: *const core::ffi::c_void) -> f32 {
+    // SAFETY: by contract.
+    match unsafe { table.as_ref() } {
+        // The function was appended to the table: an older plugin's ends before it.
+        Some(t) if t.size as usize >= size_of::<ScatterTable>() => match t.eta {
+            // SAFETY: by contract.
+            Some(eta) => unsafe { eta(data) },
+            None => 1.0,
+        },
+        _ => 1.0,
+    }
+}
+
 /// Treats a panic as absorption; use the `try_` functions where it must not pass unseen.
 impl Scatter for Closure {
     #[inline(always)]
@@ -129,5 +157,11 @@ impl Scatter for Closure {
         }
         // SAFETY: as in `try_eval`.
         unsafe { ((*self.table).lobes)((&raw const self.data).cast()) }
+    }
+
+    #[inline(always)]
+    fn eta(&self) -> f32 {
+        // SAFETY: the table is null or valid; the data is its own.
+        unsafe { eta_of(self.table, (&raw const self.data).cast()) }
     }
 }

@@ -158,6 +158,7 @@ impl<C: Scatter + Copy + Send + Sync + 'static> ScatterShim<C> {
         eval: Self::eval,
         sample: Self::sample,
         lobes: Self::lobes,
+        eta: Some(Self::eta),
     };
 
     unsafe extern "C" fn eval(
@@ -209,6 +210,15 @@ impl<C: Scatter + Copy + Send + Sync + 'static> ScatterShim<C> {
         catch_unwind(AssertUnwindSafe(|| closure.lobes())).unwrap_or_else(|payload| {
             closure_panicked(payload);
             0
+        })
+    }
+
+    unsafe extern "C" fn eta(data: *const c_void) -> f32 {
+        // SAFETY: as above.
+        let closure = unsafe { &*data.cast::<C>() };
+        catch_unwind(AssertUnwindSafe(|| closure.eta())).unwrap_or_else(|payload| {
+            closure_panicked(payload);
+            1.0
         })
     }
 }
@@ -341,6 +351,7 @@ impl<T: Plugin + Bsdf> BsdfShim<T> {
         destroy: destroy::<T>,
         traits: Self::traits,
         closure: Self::closure,
+        ior: Some(Self::ior),
     };
 
     unsafe extern "C" fn traits(p: *const c_void) -> u32 {
@@ -350,6 +361,15 @@ impl<T: Plugin + Bsdf> BsdfShim<T> {
             // There is no status here: the host looks for a report after the call.
             i.host.fail(&panic_text(payload));
             0
+        })
+    }
+
+    unsafe extern "C" fn ior(p: *const c_void) -> f32 {
+        // SAFETY: a live instance, by the ABI.
+        let i = unsafe { instance::<T>(p) };
+        catch_unwind(AssertUnwindSafe(|| i.value.ior())).unwrap_or_else(|payload| {
+            i.host.fail(&panic_text(payload));
+            1.0
         })
     }
 

@@ -15,6 +15,7 @@ pub mod extent;
 pub mod integrator;
 pub mod math;
 pub mod medium;
+pub mod nested;
 pub mod operator;
 pub mod params;
 pub mod phase;
@@ -31,6 +32,7 @@ pub use extent::Extent;
 pub use integrator::{Integrator, Output, SceneView, Stopped, Transport};
 pub use math::{Aabb, Affine, Vec3};
 pub use medium::{Cell, Field, Medium, MediumInfo};
+pub use nested::{NestedBsdf, NestedClosures};
 pub use operator::{
     Coefficients, Event, Flight, FlightDraws, Mode, Scatter, ScatterDraws, ScatterEval,
     ScatterSample, Segment,

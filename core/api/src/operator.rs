@@ -11,6 +11,16 @@ use crate::spectrum::Spectrum;
 use bytemuck::{Pod, Zeroable};
 
 /// What is carried along a walk; scattering is not symmetric for shading normals and refraction (Veach 1997, §5.3).
+///
+/// **Who corrects what.** A closure gives the value for light that travels from `wo` to `wi`, per power: what an
+/// importance walk carries. Where nothing is absorbed, ∫ f |cos θ_i| dω_i = 1 on both sides of a refracting surface. It is
+/// symmetric but for refraction, with η = n(side of wi)/n(side of wo):
+///
+///   f(wo, wi) = η² f(wi, wo)                                     (Veach 1997, eq. 5.14)
+///
+/// Radiance arriving from `wi` is η² times as dense on its side, so a radiance walk carries f/η². That division, and the
+/// factor for shading normals, are applied in `resolvent_pathspace::scatter` and nowhere else; closures take the mode only to
+/// pass it on. The index comes from [`ScatterSample::eta`] for samples and from [`Scatter::eta`] for given pairs.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
@@ -59,7 +69,8 @@ pub struct ScatterDraws {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct ScatterEval {
-    /// BSDF value (sr⁻¹, no cosine) or phase function value (sr⁻¹, without σ_s). Delta lobes contribute nothing.
+    /// BSDF value for light from `wo` to `wi` (sr⁻¹, no cosine; see [`Mode`]) or phase function value (sr⁻¹, without σ_s).
+    /// Delta lobes contribute nothing.
     pub f: Spectrum,
     /// Density of sampling `wi` given `wo`, sr⁻¹.
     pub forward: f32,
@@ -75,7 +86,7 @@ pub struct ScatterSample {
     pub weight: Spectrum,
     /// The direction, unit length, in the coordinates of `wo`.
     pub wi: Float3,
-    /// Relative index of refraction across the event (1 if not refracted): the far side's over the near side's.
+    /// Relative index of refraction across the event (1 if not refracted): that of the side of `wi` over that of `wo`.
     pub eta: f32,
     /// Density of `wi` given `wo`; sr⁻¹, or a probability for [`Measure::Discrete`].
     pub forward: f32,
@@ -107,6 +118,11 @@ pub trait Scatter {
     fn sample(&self, wo: Vec3, u: ScatterDraws, mode: Mode) -> Option<ScatterSample>;
     /// The kinds of lobes present, see [`lobes`].
     fn lobes(&self) -> u32;
+    /// Index of refraction below the surface (z < 0) over that above, for pairs of directions on different sides; 1 if light
+    /// passes unbent, and for phase functions.
+    fn eta(&self) -> f32 {
+        1.0
+    }
 }
 
 /// A stretch of a straight line: the points `o + t d` with `t0 ≤ t ≤ t1`.

@@ -1,9 +1,11 @@
 //! Parameters: declared in the plugin, checked by the host, read here.
 
 use crate::abi::{
-    CreateArgs, HostTable, ParamDecl, ParamKind, ParamValue, Task, Text, param_flags,
+    BsdfTable, CreateArgs, HostTable, ParamDecl, ParamKind, ParamValue, PluginKind, Task, Text,
+    param_flags,
 };
 use crate::math::{Affine, DVec3};
+use crate::nested::NestedBsdf;
 use crate::spectrum::Spectrum;
 use core::ffi::c_void;
 
@@ -226,6 +228,27 @@ impl<'a> Params<'a> {
     pub fn has_plugin(&self, name: &str) -> bool {
         self.find(name, ParamKind::Plugin)
             .is_some_and(|p| !p.header.is_null())
+    }
+
+    /// A nested BSDF, if given.
+    ///
+    /// # Errors
+    /// If the nested plugin is of another kind.
+    pub fn bsdf(&self, name: &str) -> Result<Option<NestedBsdf>, Error> {
+        let Some(p) = self.find(name, ParamKind::Plugin) else {
+            return Ok(None);
+        };
+        // SAFETY: the host passes a header that it has checked, or null; headers and tables are statics of libraries that stay.
+        let Some(header) = (unsafe { p.header.as_ref() }) else {
+            return Ok(None);
+        };
+        if header.kind != PluginKind::Bsdf as u32 || p.instance.is_null() {
+            return Err(Error(format!("the parameter '{name}' is no BSDF")));
+        }
+        // SAFETY: the kind says what the table is; the host keeps the instance alive as long as the one being made.
+        Ok(Some(unsafe {
+            NestedBsdf::new(&*header.table.cast::<BsdfTable>(), p.instance)
+        }))
     }
 
     /// Object to world.

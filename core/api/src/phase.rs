@@ -19,7 +19,7 @@ pub struct MediumPoint {
 /// The closure is given world directions. Its value integrates to 1 over `wi`; with both directions pointing away from
 /// the vertex, forward scattering has `wo·wi` = −1.
 pub trait PhaseFunction: Send + Sync + 'static {
-    /// K/σ_s at one point: at most 240 bytes, stored inline in the vertex. What doesn't fit, such as a table, stays in the
+    /// K/σ_s at one point: at most [`CLOSURE_BYTES`](crate::closure::CLOSURE_BYTES) bytes, stored inline in the vertex. What doesn't fit, such as a table, stays in the
     /// instance and is borrowed: the host destroys an instance only after the last use of its closures.
     type Closure<'a>: Scatter + Copy + Send + Sync
     where

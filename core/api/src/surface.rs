@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// A point on a surface, as a BSDF sees it.
 #[repr(C)]
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct SurfacePoint {
     /// Position.
     pub p: Float3,
@@ -18,8 +18,24 @@ pub struct SurfacePoint {
     pub uv: [f32; 2],
     /// Lanes in use.
     pub lanes: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// Index of refraction of what lies on the side that `ng` points to: 1 in vacuum, the outer medium's where dielectrics are
+    /// nested.
+    pub outside_ior: f32,
+}
+
+/// A point at the origin in vacuum, its normal along z.
+impl Default for SurfacePoint {
+    fn default() -> Self {
+        let frame = Frame::around(crate::Vec3::Z);
+        Self {
+            p: [0.0; 3],
+            ng: frame.n,
+            frame,
+            uv: [0.0; 2],
+            lanes: 3,
+            outside_ior: 1.0,
+        }
+    }
 }
 
 /// Facts about a BSDF; bits of [`Bsdf::traits`].
@@ -32,10 +48,16 @@ pub mod bsdf_traits {
 
 /// A BSDF plugin: textures are looked up once per vertex, the closure is what gets evaluated and sampled.
 pub trait Bsdf: Send + Sync + 'static {
-    /// K at one point: at most 240 bytes, stored inline in the vertex.
+    /// K at one point: at most [`CLOSURE_BYTES`](crate::closure::CLOSURE_BYTES) bytes, stored inline in the vertex.
     type Closure: Scatter + Copy + Send + Sync + 'static;
     /// Bits of [`bsdf_traits`].
     fn traits(&self) -> u32;
+    /// Index of refraction of what lies inside, on the side that the geometric normal points away from; 1 if light isn't
+    /// refracted. The host nests dielectrics by it: what one closed surface reports here is the `outside_ior` of another
+    /// inside it.
+    fn ior(&self) -> f32 {
+        1.0
+    }
     /// Resolves the BSDF at a point.
     fn closure(&self, at: &SurfacePoint) -> Self::Closure;
 }

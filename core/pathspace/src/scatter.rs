@@ -1,13 +1,14 @@
 //! K at a vertex: frames, cosines and the corrections that keep transport symmetric, applied here and nowhere else.
 
 use resolvent_api::integrator::{Outcome, SceneView};
-use resolvent_api::operator::{Measure, Mode, ScatterDraws, ScatterEval, ScatterSample};
+use resolvent_api::operator::{Measure, Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample};
 use resolvent_api::{Vec3, Vertex, VertexKind};
 
 /// f̄·D towards `wi`: the BSDF times |ns·wi|, or the phase function, with the densities per steradian.
 ///
 /// In radiance mode the shading normal's cosine replaces the geometric one. In importance mode the BSDF is the
-/// adjoint, which carries |wo·ns| |wi·ng| / (|wo·ng| |wi·ns|) (Veach 1997, eq. 5.19). σ_s of a medium vertex is not part of it:
+/// adjoint, which carries |wo·ns| |wi·ng| / (|wo·ng| |wi·ns|) (Veach 1997, eq. 5.19). Radiance that is refracted is divided by η²,
+/// see [`Mode`]. σ_s of a medium vertex is not part of it:
 /// it belongs to the collision.
 ///
 /// # Errors
@@ -22,6 +23,10 @@ pub fn eval(scene: &SceneView<'_>, v: &Vertex, wi: Vec3, mode: Mode) -> Outcome<
         let (lo, li) = (v.frame.to_local(wo), v.frame.to_local(wi));
         v.scatter.try_eval(lo, li, mode).map(|mut e| {
             e.f *= correction * li.z.abs();
+            if lo.z * li.z < 0.0 {
+                let eta = v.scatter.eta();
+                e.f *= refraction(if lo.z > 0.0 { eta } else { 1.0 / eta }, mode);
+            }
             e
         })
     } else {
@@ -62,7 +67,7 @@ pub fn sample(
         let Some(correction) = correction(v, wo, wi, mode) else {
             return Ok(None);
         };
-        s.weight *= correction;
+        s.weight *= correction * refraction(s.eta, mode);
         s.wi = wi.into();
     }
     Ok(Some(s))
@@ -72,6 +77,16 @@ pub fn sample(
 #[inline(always)]
 pub fn is_delta(s: &ScatterSample) -> bool {
     s.measure == Measure::Discrete as u32
+}
+
+/// The factor for refraction: radiance is compressed by η² where `eta` is the index on the side of `wi` over that on the side
+/// of `wo` (Veach 1997, eq. 5.14); power, which importance walks carry, is not.
+#[inline(always)]
+fn refraction(eta: f32, mode: Mode) -> f32 {
+    match mode {
+        Mode::Radiance => 1.0 / (eta * eta),
+        Mode::Importance => 1.0,
+    }
 }
 
 /// The factor for shading normals, or `None` where the two normals disagree about the side a direction is on: there

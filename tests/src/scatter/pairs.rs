@@ -4,17 +4,23 @@ use super::directions;
 use crate::Suite;
 use resolvent_api::{Mode, Scatter, Vec3};
 
-/// Helmholtz reciprocity, and that the reverse density is the forward density of the swapped pair.
+/// Reciprocity, f(wo, wi) = η² f(wi, wo) with the index of the side of `wi` over that of `wo` (see [`Mode`]), and that the reverse density is the forward density of the swapped pair.
 pub fn symmetry(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3) {
     for wi in directions(500, 0xd12) {
         let (a, b) = (
             k.eval(wo, wi, Mode::Radiance),
             k.eval(wi, wo, Mode::Radiance),
         );
+        let eta2 = match (wo.z > 0.0, wi.z > 0.0) {
+            (true, false) => k.eta().powi(2),
+            (false, true) => k.eta().powi(-2),
+            _ => 1.0,
+        };
+        let swapped = b.f * eta2;
         for (x, y, what) in [
-            (a.f[0], b.f[0], "f, lane 0"),
-            (a.f[1], b.f[1], "f, lane 1"),
-            (a.f[2], b.f[2], "f, lane 2"),
+            (a.f[0], swapped[0], "f, lane 0"),
+            (a.f[1], swapped[1], "f, lane 1"),
+            (a.f[2], swapped[2], "f, lane 2"),
             (a.forward, b.reverse, "forward and reverse density"),
             (a.reverse, b.forward, "reverse and forward density"),
         ] {
@@ -28,7 +34,7 @@ pub fn symmetry(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3) {
     }
 }
 
-/// Without refraction and shading normals both modes agree.
+/// Both modes agree: what differs between them is the core's to apply.
 pub fn modes(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3) {
     for wi in directions(100, 0x30de) {
         let (a, b) = (

@@ -104,12 +104,14 @@ fn layouts_agree() {
         "scatter_sample": ScatterSample {
             "wi" = wi, "eta" = eta, "forward" = forward, "measure" = measure, "lobe" = lobe
         },
-        "scatter_table": ScatterTable { "eval" = eval, "sample" = sample, "lobes" = lobes },
+        "scatter_table": ScatterTable { "eval" = eval, "sample" = sample, "lobes" = lobes, "eta" = eta },
         "closure": Closure {},
         "medium_point": MediumPoint { "lanes" = lanes },
-        "surface_point": SurfacePoint { "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes },
+        "surface_point": SurfacePoint {
+            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior
+        },
         "phase_table": PhaseTable { "create" = create, "closure" = closure },
-        "bsdf_table": BsdfTable { "traits" = traits, "closure" = closure },
+        "bsdf_table": BsdfTable { "traits" = traits, "closure" = closure, "ior" = ior },
         "medium_info": MediumInfo {
             "traits" = traits, "sigma_max" = sigma_max, "memory" = memory, "voxels" = voxels
         },

@@ -221,6 +221,7 @@ pub struct ForeignBsdf {
     instance: Arc<Instance>,
     table: &'static BsdfTable,
     traits: u32,
+    ior: f32,
 }
 
 impl ForeignBsdf {
@@ -234,14 +235,28 @@ impl ForeignBsdf {
         let table = unsafe { instance.table::<BsdfTable>() };
         // SAFETY: a live instance of this table's plugin.
         let traits = unsafe { (table.traits)(instance.pointer) };
+        let ior = match table.ior {
+            // SAFETY: as above.
+            Some(ior) => unsafe { ior(instance.pointer) },
+            None => 1.0,
+        };
         if let Some(why) = pending_failure() {
             return Err(instance.error(&why));
+        }
+        if !(ior > 0.0 && ior.is_finite()) {
+            return Err(instance.error(&format!("claims the impossible index of refraction {ior}")));
         }
         Ok(Self {
             instance,
             table,
             traits,
+            ior,
         })
+    }
+
+    /// Index of refraction inside, see [`resolvent_api::Bsdf::ior`].
+    pub fn ior(&self) -> f32 {
+        self.ior
     }
 
     /// True if light passes unchanged.

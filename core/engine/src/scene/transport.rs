@@ -327,7 +327,7 @@ impl View<'_> {
             frame: next.frame,
             uv: next.uv,
             lanes: self.scene.lanes,
-            reserved: 0,
+            outside_ior: 1.0,
         };
         material
             .bsdf
