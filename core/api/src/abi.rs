@@ -17,7 +17,7 @@ use crate::operator::{
 use crate::phase::MediumPoint;
 use crate::spectrum::Spectrum;
 use crate::surface::SurfacePoint;
-use crate::vertex::{CameraRay, Edge, LightSample, Vertex};
+use crate::vertex::{CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex};
 use core::ffi::c_void;
 
 /// First bytes of every plugin header.
@@ -492,6 +492,37 @@ pub struct SceneTable {
         u: *const FlightDraws,
         edge: *mut Edge,
     ) -> Status,
+    /// Ray through the position `film` (pixels), without the reconstruction filter.
+    pub film_ray: unsafe extern "C" fn(
+        ctx: *const c_void,
+        film: *const [f32; 2],
+        lens: *const [f32; 2],
+        out: *mut CameraRay,
+    ) -> Status,
+    /// Chooses a point on the lens for `reference`, where it can connect to. [`Status::NONE`] if it is not on the film.
+    pub sense: unsafe extern "C" fn(
+        ctx: *const c_void,
+        reference: *const Vertex,
+        lens: *const [f32; 2],
+        out: *mut SensorSample,
+    ) -> Status,
+    /// Chooses a light, a vertex on it and a ray that leaves it. [`Status::NONE`] if there is none.
+    pub emit: unsafe extern "C" fn(
+        ctx: *const c_void,
+        choice: f32,
+        position: *const [f32; 2],
+        direction: *const [f32; 2],
+        out: *mut LightRay,
+        vertex: *mut Vertex,
+    ) -> Status,
+    /// The two densities with which `emit` gives the vertex `light` and a ray towards `to`, as in [`LightRay`]:
+    /// `position`, `direction`.
+    pub emission_density: unsafe extern "C" fn(
+        ctx: *const c_void,
+        light: *const Vertex,
+        to: *const Vertex,
+        out: *mut [f32; 2],
+    ) -> Status,
 }
 
 /// Features of a pixel sample beyond its radiance; filled if [`Tile::features`] asks for them.
@@ -526,6 +557,8 @@ pub struct Tile {
     pub seed: u64,
     /// Width and height of the full image, pixels.
     pub resolution: [u32; 2],
+    /// The window that is rendered: first column and row, one past the last column and row.
+    pub window: [u32; 4],
     /// 1 if features are wanted.
     pub features: u32,
     /// Zero.
@@ -548,8 +581,8 @@ pub struct OutputTable {
         y: u32,
         sample: *const PixelSample,
     ) -> Status,
-    /// Adds light to the film at position `film` (pixels), for walks that start at lights. The image divides by the number
-    /// of samples of the whole picture.
+    /// Adds light to the film at position `film` (pixels), for walks that start at lights: every pixel receives it times the
+    /// value of its reconstruction filter there, divided by the number of samples of all pixels of the window together.
     pub splat: unsafe extern "C" fn(
         ctx: *mut c_void,
         film: *const [f32; 2],

@@ -4,7 +4,7 @@ use crate::abi::{OutputTable, PixelSample, SceneTable, Status, Text, Tile, scene
 use crate::math::Vec3;
 use crate::operator::FlightDraws;
 use crate::spectrum::Spectrum;
-use crate::vertex::{CameraRay, Edge, LightSample, Vertex};
+use crate::vertex::{CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex};
 
 /// A host call failed (a plugin broke, or the render was stopped); return it at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,6 +146,59 @@ impl<'a> SceneView<'a> {
         Stopped
     }
 
+    /// The camera's ray through the position `film` (pixels), without the reconstruction filter.
+    #[inline(always)]
+    pub fn film_ray(&self, film: [f32; 2], lens: [f32; 2]) -> Outcome<Option<CameraRay>> {
+        let mut ray = CameraRay::default();
+        // SAFETY: as above.
+        let status = unsafe { (self.table.film_ray)(self.table.ctx, &film, &lens, &mut ray) };
+        Ok(found(status)?.then_some(ray))
+    }
+
+    /// A point on the lens for `reference`; `None` if it does not see the film.
+    #[inline(always)]
+    pub fn sense(&self, reference: &Vertex, lens: [f32; 2]) -> Outcome<Option<SensorSample>> {
+        let mut out = core::mem::MaybeUninit::<SensorSample>::uninit();
+        // SAFETY: as above; the host fills `out` completely when it returns OK.
+        unsafe {
+            let status = (self.table.sense)(self.table.ctx, reference, &lens, out.as_mut_ptr());
+            Ok(found(status)?.then(|| out.assume_init()))
+        }
+    }
+
+    /// Chooses a light, a vertex on it and a ray that leaves it; `None` if there is none.
+    #[inline(always)]
+    pub fn emit(
+        &self,
+        choice: f32,
+        position: [f32; 2],
+        direction: [f32; 2],
+        vertex: &mut Vertex,
+    ) -> Outcome<Option<LightRay>> {
+        let mut ray = LightRay::default();
+        // SAFETY: as above.
+        let status = unsafe {
+            (self.table.emit)(
+                self.table.ctx,
+                choice,
+                &position,
+                &direction,
+                &mut ray,
+                vertex,
+            )
+        };
+        Ok(found(status)?.then_some(ray))
+    }
+
+    /// The densities (position, direction; see [`LightRay`]) with which [`SceneView::emit`] gives `light` and a ray to `to`.
+    #[inline(always)]
+    pub fn emission_density(&self, light: &Vertex, to: &Vertex) -> Outcome<[f32; 2]> {
+        let mut out = [0.0; 2];
+        // SAFETY: as above.
+        found(unsafe { (self.table.emission_density)(self.table.ctx, light, to, &mut out) })?;
+        Ok(out)
+    }
+
     /// Approximate transmittance towards a light, visibility not tested.
     #[inline(always)]
     pub fn approximate(&self, from: &Vertex, to: &LightSample) -> Outcome<Spectrum> {
@@ -200,7 +253,8 @@ impl<'a> Output<'a> {
         found(unsafe { (self.table.add)(self.table.ctx, x, y, sample) }).map(|_| ())
     }
 
-    /// Adds light to the film at a position in pixels.
+    /// Adds light to the film at a position in pixels: every pixel receives it times the value of its reconstruction filter
+    /// there, divided by the number of samples of all pixels of the window together.
     #[inline(always)]
     pub fn splat(&mut self, film: [f32; 2], radiance: Spectrum) -> Outcome<()> {
         // SAFETY: as above.

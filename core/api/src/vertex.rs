@@ -189,4 +189,42 @@ pub struct CameraRay {
     pub weight: f32,
     /// The interior media the camera is in: private to the host.
     pub inside: u64,
+    /// Density of the direction (sr⁻¹) under film positions of density 1 per pixel area, whatever the reconstruction filter:
+    /// what weights between techniques are made of.
+    pub density: f32,
+    /// Zero.
+    pub reserved: u32,
+}
+
+/// A ray that leaves a light: the start of a light walk. The vertex it leaves from is filled beside it.
+///
+/// Densities: for lights with a place, `position` is per area (a probability for point lights) and `direction` per steradian;
+/// for lights at infinity, `position` is that of the direction, per steradian (a probability for parallel light), and
+/// `direction` that of the ray's place, per area across it. The choice of the light is part of `position`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LightRay {
+    /// Origin.
+    pub o: Float3,
+    /// Density of the vertex on the light.
+    pub position: f32,
+    /// Unit direction.
+    pub d: Float3,
+    /// Density of the ray, given that vertex.
+    pub direction: f32,
+    /// Radiance (for lights of delta position: intensity; of delta direction: irradiance) times the cosine at the light,
+    /// over both densities.
+    pub weight: Spectrum,
+    /// The interior media the ray starts in: private to the host.
+    pub inside: u64,
+}
+
+/// A point on the lens as a vertex of the scene sees it.
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct SensorSample {
+    /// What to connect to. `density` is that of [`CameraRay`]: importance per steradian at the lens, 1 per pixel area.
+    pub target: LightSample,
+    /// Position on the film, pixels.
+    pub film: [f32; 2],
 }

@@ -15,9 +15,17 @@ pub enum Filter {
     Gaussian(Box<Table>),
 }
 
-/// Positions (pixels from the centre) at equal steps of a filter's cumulative distribution, the positive half.
+/// A truncated Gaussian less its value at the radius.
 #[derive(Clone, Debug)]
-pub struct Table([f32; STEPS + 1]);
+pub struct Table {
+    /// Positions (pixels from the centre) at equal steps of the cumulative distribution, the positive half.
+    positions: [f32; STEPS + 1],
+    radius: f32,
+    /// 1/(2σ²), the value at the radius, and the integral over both halves.
+    decay: f32,
+    floor: f32,
+    total: f32,
+}
 
 const STEPS: usize = 2048;
 
@@ -43,6 +51,30 @@ impl Filter {
             Self::Gaussian(table) => mirrored(u, |v| table.at(v)),
         }
     }
+
+    /// Half width, pixels.
+    pub fn radius(&self) -> f32 {
+        match self {
+            Self::Box(radius) | Self::Tent(radius) => *radius,
+            Self::Gaussian(table) => table.radius,
+        }
+    }
+
+    /// The filter at `x` pixels from the pixel's centre, normalised to integral 1 along the axis: the density of [`sample`].
+    ///
+    /// [`sample`]: Self::sample
+    pub fn value(&self, x: f32) -> f32 {
+        match self {
+            // Half open: a position on the border between two pixels belongs to one.
+            Self::Box(radius) if x >= -radius && x < *radius => 0.5 / radius,
+            Self::Box(_) => 0.0,
+            Self::Tent(radius) => (1.0 - x.abs() / radius).max(0.0) / radius,
+            Self::Gaussian(table) if x.abs() < table.radius => {
+                ((-x * x * table.decay).exp() - table.floor).max(0.0) / table.total
+            }
+            Self::Gaussian(_) => 0.0,
+        }
+    }
 }
 
 /// Applies a map of the positive half-axis to both halves.
@@ -61,8 +93,8 @@ impl Table {
         let half = sigma * (0.5 * std::f64::consts::PI).sqrt();
         let integral = |x: f64| half * libm::erf(x / (sigma * SQRT_2)) - floor * x;
         let total = integral(radius);
-        let mut table = [radius as f32; STEPS + 1];
-        for (i, entry) in table.iter_mut().enumerate().take(STEPS) {
+        let mut positions = [radius as f32; STEPS + 1];
+        for (i, entry) in positions.iter_mut().enumerate().take(STEPS) {
             let target = total * i as f64 / STEPS as f64;
             let (mut low, mut high) = (0.0, radius);
             for _ in 0..60 {
@@ -75,19 +107,55 @@ impl Table {
             }
             *entry = (0.5 * (low + high)) as f32;
         }
-        Self(table)
+        Self {
+            positions,
+            radius: radius as f32,
+            decay: (0.5 / (sigma * sigma)) as f32,
+            floor: floor as f32,
+            total: (2.0 * total) as f32,
+        }
     }
 
     fn at(&self, v: f32) -> f32 {
         let x = v * STEPS as f32;
         let i = (x as usize).min(STEPS - 1);
-        self.0[i] + (self.0[i + 1] - self.0[i]) * (x - i as f32)
+        self.positions[i] + (self.positions[i + 1] - self.positions[i]) * (x - i as f32)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Values integrate to 1, and their second moment is that of the samples.
+    #[test]
+    fn values_are_the_density_of_samples() {
+        for described in [
+            Described::Box { radius: 0.5 },
+            Described::Tent { radius: 1.5 },
+            Described::Gaussian {
+                radius: 1.5,
+                sigma: 0.5,
+            },
+        ] {
+            let f = Filter::new(described);
+            let n = 100_000;
+            let (mut total, mut moment, mut sampled) = (0.0, 0.0, 0.0);
+            for i in 0..n {
+                let u = (f64::from(i) + 0.5) / f64::from(n);
+                let x = f64::from(f.radius()) * (2.0 * u - 1.0);
+                let w = f64::from(f.value(x as f32)) * 2.0 * f64::from(f.radius()) / f64::from(n);
+                total += w;
+                moment += w * x * x;
+                sampled += f64::from(f.sample(u as f32)).powi(2) / f64::from(n);
+            }
+            assert!((total - 1.0).abs() < 1e-4, "{described:?}: {total}");
+            assert!(
+                (moment / sampled - 1.0).abs() < 1e-3,
+                "{described:?}: {moment} {sampled}"
+            );
+        }
+    }
 
     /// Second moments of the sampled offsets against the filters' own, by midpoint quadrature over u.
     #[test]

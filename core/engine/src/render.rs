@@ -135,6 +135,7 @@ pub fn render(
                 sample_end: end,
                 seed: settings.seed,
                 resolution: settings.resolution,
+                window: settings.window,
                 features: u32::from(settings.features),
                 reserved: 0,
             };
@@ -242,7 +243,7 @@ fn piece(
         let first = work.rejected_at.map_or(at, |old| old.min(at));
         work.rejected_at = Some(first);
     }
-    work.film.merge(sink.buffer);
+    work.film.merge(sink.buffer, scene.camera.filter());
     Ok(())
 }
 
@@ -263,12 +264,19 @@ unsafe extern "C" fn add(ctx: *mut c_void, x: u32, y: u32, sample: *const PixelS
     }
 }
 
-unsafe extern "C" fn splat(ctx: *mut c_void, _: *const [f32; 2], _: *const Spectrum) -> Status {
+unsafe extern "C" fn splat(
+    ctx: *mut c_void,
+    film: *const [f32; 2],
+    radiance: *const Spectrum,
+) -> Status {
     // SAFETY: as above.
-    let sink = unsafe { &mut *ctx.cast::<Sink>() };
-    sink.error
-        .get_or_insert("splats light, which this resolvent cannot record yet".into());
-    Status::ERROR
+    let (sink, film, radiance) = unsafe { (&mut *ctx.cast::<Sink>(), *film, *radiance) };
+    if !sink.buffer.splats.add(film, radiance) {
+        sink.buffer.rejected += 1;
+        let at = film.map(|v| v.max(0.0) as u32);
+        sink.buffer.rejected_at.get_or_insert(at);
+    }
+    Status::OK
 }
 
 /// The tiles of a window, in rows from its top.

@@ -21,6 +21,27 @@ pub struct Area {
     pub area: f32,
 }
 
+/// A point on an emitting shape.
+#[derive(Clone, Copy, Debug)]
+pub struct AreaPoint {
+    /// Position.
+    pub p: Vec3,
+    /// Sum of the magnitudes of the terms that make each coordinate, of which rounding takes its share.
+    pub size: Vec3,
+    /// Unit normal.
+    pub ng: Vec3,
+    /// Primitive of the shape.
+    pub prim: u32,
+}
+
+impl AreaPoint {
+    /// Bound of the rounding error in each coordinate: half an ulp for each of the few operations that gave it, relative to the
+    /// terms involved. Where they cancel, the coordinate is small and its error is not.
+    pub fn error(&self) -> Vec3 {
+        self.size * 6e-7
+    }
+}
+
 /// The form of an emitting shape.
 pub enum AreaShape {
     /// A parallelogram; points are uniform in area.
@@ -89,14 +110,22 @@ impl Area {
 
     /// Chooses a point for `from`; `None` if it shows nothing there.
     pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        // `size`: sum of the magnitudes of the terms that make each coordinate, of which rounding takes its share.
-        let (p, size, ng, prim, density) = match &self.form {
+        if let AreaShape::Sphere(s) = &self.form {
+            return self.sample_sphere(s, from, u);
+        }
+        let at = self.point(u)?;
+        let density = per_solid_angle(1.0 / self.area, from, at.p, at.ng);
+        self.finish(from, &at, density)
+    }
+
+    /// Chooses a point, uniform in area.
+    pub fn point(&self, u: [f32; 2]) -> Option<AreaPoint> {
+        let (p, size, ng, prim) = match &self.form {
             AreaShape::Quad(q) => {
                 let p = q.corner + q.edge_u * u[0] + q.edge_v * u[1];
                 let ng = q.edge_u.cross(q.edge_v).normalize_or_zero();
-                let density = per_solid_angle(1.0 / self.area, from, p, ng);
                 let size = q.corner.abs() + q.edge_u.abs() + q.edge_v.abs();
-                (p, size, ng, u32::from(u[1] > u[0]), density)
+                (p, size, ng, u32::from(u[1] > u[0]))
             }
             AreaShape::Mesh(mesh, distribution) => {
                 let (i, rest) = distribution.sample(u[0])?;
@@ -109,28 +138,19 @@ impl Area {
                 let p = a + (b - a) * s + (c - a) * t;
                 let ng = (b - a).cross(c - a).normalize_or_zero();
                 let size = a.abs() + (b - a).abs() + (c - a).abs();
-                (
-                    p,
-                    size,
-                    ng,
-                    i as u32,
-                    per_solid_angle(1.0 / self.area, from, p, ng),
-                )
+                (p, size, ng, i as u32)
             }
-            AreaShape::Sphere(s) => return self.sample_sphere(s, from, u),
+            AreaShape::Sphere(s) => {
+                let n = warp::sphere(u);
+                let size = s.center.abs() + Vec3::splat(s.radius);
+                (s.center + n * s.radius, size, n, 0)
+            }
         };
-        self.finish(from, p, size, ng, prim, density)
+        Some(AreaPoint { p, size, ng, prim })
     }
 
-    fn finish(
-        &self,
-        from: Vec3,
-        p: Vec3,
-        size: Vec3,
-        ng: Vec3,
-        prim: u32,
-        density: f32,
-    ) -> Option<LightSample> {
+    fn finish(&self, from: Vec3, at: &AreaPoint, density: f32) -> Option<LightSample> {
+        let (p, ng) = (at.p, at.ng);
         let d = p - from;
         let distance = d.length();
         let shows = self.two_sided || ng.dot(d) < 0.0;
@@ -146,22 +166,18 @@ impl Area {
             flags: 0,
             p: p.into(),
             ng: ng.into(),
-            primitive: [self.shape, prim],
-            // Half an ulp for each of the few operations that gave a coordinate, relative to the terms involved: where they
-            // cancel, the coordinate is small and its error is not.
-            p_error: (size * 6e-7).into(),
+            primitive: [self.shape, at.prim],
+            p_error: at.error().into(),
         })
     }
 
     fn sample_sphere(&self, s: &Sphere, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
-        let size = s.center.abs() + Vec3::splat(s.radius);
         let to_centre = s.center - from;
         let d2 = to_centre.length_squared();
         let Some(one_minus_cos) = cone_of(s, d2) else {
-            let n = warp::sphere(u);
-            let p = s.center + n * s.radius;
-            let density = per_solid_angle(1.0 / self.area, from, p, n);
-            return self.finish(from, p, size, n, 0, density);
+            let at = self.point(u)?;
+            let density = per_solid_angle(1.0 / self.area, from, at.p, at.ng);
+            return self.finish(from, &at, density);
         };
         let frame = Frame::around(to_centre.normalize());
         let w = frame.to_world(warp::cone(u, one_minus_cos));
@@ -170,8 +186,13 @@ impl Area {
         let off = to_centre - w * along;
         let half = (s.radius * s.radius - off.length_squared()).max(0.0).sqrt();
         let n = (-off - w * half).normalize_or_zero();
-        let p = s.center + n * s.radius;
-        self.finish(from, p, size, n, 0, 1.0 / (2.0 * PI * one_minus_cos))
+        let at = AreaPoint {
+            p: s.center + n * s.radius,
+            size: s.center.abs() + Vec3::splat(s.radius),
+            ng: n,
+            prim: 0,
+        };
+        self.finish(from, &at, 1.0 / (2.0 * PI * one_minus_cos))
     }
 
     /// Density (sr⁻¹) with which [`Area::sample`] at `from` finds the point `at` with normal `ng`.

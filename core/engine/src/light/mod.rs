@@ -5,11 +5,13 @@
 
 mod area;
 mod distribution;
+mod emission;
 mod image;
 mod select;
 
-pub use area::{Area, AreaShape};
+pub use area::{Area, AreaPoint, AreaShape};
 pub use distribution::Distribution;
+pub use emission::BoundingSphere;
 pub use image::ImageEnvironment;
 pub use select::{Chooser, Lights};
 

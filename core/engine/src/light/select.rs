@@ -1,6 +1,6 @@
 //! All lights of a scene and the choice among them.
 
-use super::{Distribution, Light};
+use super::{BoundingSphere, Distribution, Light};
 use resolvent_api::Spectrum;
 use resolvent_api::math::Vec3;
 use resolvent_api::vertex::{LightSample, vertex_flags};
@@ -48,7 +48,7 @@ impl Chooser {
         }
     }
 
-    fn choose(&self, u: f32) -> Option<(u32, f32, f32)> {
+    pub(super) fn choose(&self, u: f32) -> Option<(u32, f32, f32)> {
         match self.lights.as_slice() {
             [] => None,
             [only] => Some((*only, 1.0, u)),
@@ -57,6 +57,11 @@ impl Chooser {
                 Some((many[k], self.probability[many[k] as usize], rest))
             }
         }
+    }
+
+    /// Probability of choosing light `i`.
+    pub(super) fn probability(&self, i: u32) -> f32 {
+        self.probability.get(i as usize).copied().unwrap_or(0.0)
     }
 
     /// True if there is nothing to choose.
@@ -75,11 +80,14 @@ pub struct Lights {
     /// For vertices in media: a constant environment is left out, since scattering finds it with nearly the density one
     /// could wish for.
     medium: Chooser,
+    /// Around what they shine on.
+    pub(super) bounds: BoundingSphere,
 }
 
 impl Lights {
-    /// The lights of a scene of the given radius.
-    pub fn new(all: Vec<Light>, radius: f32, lanes: u32) -> Self {
+    /// The lights of a scene within `bounds`.
+    pub fn new(all: Vec<Light>, bounds: BoundingSphere, lanes: u32) -> Self {
+        let radius = bounds.radius;
         let infinite = (0..all.len() as u32)
             .filter(|i| all[*i as usize].is_environment())
             .collect();
@@ -92,6 +100,7 @@ impl Lights {
             infinite,
             surface,
             medium,
+            bounds,
         }
     }
 

@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
-use crate::light::{Area, ImageEnvironment, Light, Lights};
+use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
 use glam::DVec3;
 use resolvent_api::abi::scene_traits;
@@ -207,7 +207,12 @@ impl Scene {
             bounds = shapes_bounds(accel.geometry(), bounds);
         }
         let radius = (0.5 * bounds.extent().length()).max(f32::MIN_POSITIVE);
-        let lights = Lights::new(lights, radius, lanes);
+        let center = if bounds.is_empty() {
+            Vec3::ZERO
+        } else {
+            bounds.centre()
+        };
+        let lights = Lights::new(lights, BoundingSphere { center, radius }, lanes);
 
         let camera_pose = to_local.after(&camera_to_world);
         let c = &scene.camera;

@@ -5,7 +5,9 @@ use crate::plugin::{ForeignMedium, pending_failure};
 use resolvent_api::abi::{SceneTable, Status, Text, scene_traits};
 use resolvent_api::math::Float3;
 use resolvent_api::operator::FlightDraws;
-use resolvent_api::vertex::{CameraRay, Edge, LightSample, Vertex, VertexKind, vertex_flags};
+use resolvent_api::vertex::{
+    CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex, VertexKind, vertex_flags,
+};
 use resolvent_api::{Spectrum, Vec3};
 use std::cell::{Cell, RefCell};
 use std::ffi::c_void;
@@ -132,6 +134,10 @@ impl<'s> View<'s> {
             approximate,
             fault,
             connect,
+            film_ray,
+            sense,
+            emit,
+            emission_density,
         }
     }
 }
@@ -296,6 +302,72 @@ unsafe extern "C" fn connect<const SURFACES: bool, const MEDIA: u8>(
     // SAFETY: as above.
     let (v, from, to, u, edge) = unsafe { (view(ctx), &*from, &*to, &*u, &mut *edge) };
     v.join::<SURFACES, MEDIA>(from, to, u, edge)
+}
+
+unsafe extern "C" fn film_ray(
+    ctx: *const c_void,
+    film: *const [f32; 2],
+    lens: *const [f32; 2],
+    out: *mut CameraRay,
+) -> Status {
+    // SAFETY: as above.
+    unsafe { *out = view(ctx).scene.camera.film_ray(*film, *lens) };
+    Status::OK
+}
+
+unsafe extern "C" fn sense(
+    ctx: *const c_void,
+    reference: *const Vertex,
+    lens: *const [f32; 2],
+    out: *mut SensorSample,
+) -> Status {
+    // SAFETY: as above.
+    let (v, reference, lens) = unsafe { (view(ctx), &*reference, *lens) };
+    match v.scene.camera.sense(reference, lens) {
+        Some(s) => {
+            // SAFETY: as above.
+            unsafe { *out = s };
+            Status::OK
+        }
+        None => Status::NONE,
+    }
+}
+
+unsafe extern "C" fn emit(
+    ctx: *const c_void,
+    choice: f32,
+    position: *const [f32; 2],
+    direction: *const [f32; 2],
+    out: *mut LightRay,
+    vertex: *mut Vertex,
+) -> Status {
+    // SAFETY: as above.
+    let (v, position, direction, vertex) =
+        unsafe { (view(ctx), *position, *direction, &mut *vertex) };
+    let scene = v.scene;
+    match scene.lights.emit(choice, position, direction, vertex) {
+        Some(mut ray) => {
+            // Lights at infinity stand outside everything.
+            if !vertex.is_infinite() {
+                ray.inside = scene.interiors_at(ray.o.into());
+            }
+            // SAFETY: as above.
+            unsafe { *out = ray };
+            Status::OK
+        }
+        None => Status::NONE,
+    }
+}
+
+unsafe extern "C" fn emission_density(
+    ctx: *const c_void,
+    light: *const Vertex,
+    to: *const Vertex,
+    out: *mut [f32; 2],
+) -> Status {
+    // SAFETY: as above.
+    unsafe { *out = view(ctx).scene.lights.emission_density(&*light, &*to) };
+    Status::OK
 }
 
 unsafe extern "C" fn fault(ctx: *const c_void, vertex: *const Vertex, message: Text) -> Status {

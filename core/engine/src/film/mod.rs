@@ -3,6 +3,11 @@
 //! Every sample is rounded once, to a multiple of 2⁻⁶⁴, and added as an integer. Any division of the work into tiles, sample
 //! ranges, threads or machines gives the same bits.
 
+mod splat;
+
+pub use splat::Splats;
+
+use crate::filter::Filter;
 use resolvent_api::Spectrum;
 use resolvent_api::abi::PixelSample;
 use resolvent_pathspace::sampler::BATCH;
@@ -73,6 +78,8 @@ pub struct Buffer {
     in_batch: u32,
     current: Option<(u32, u32)>,
     first_sample: u32,
+    /// Light from walks that started at lights.
+    pub splats: Splats,
     /// Samples that were left out.
     pub rejected: u64,
     /// Where the first of them was.
@@ -97,6 +104,7 @@ impl Buffer {
             in_batch: 0,
             current: None,
             first_sample,
+            splats: Splats::default(),
             rejected: 0,
             rejected_at: None,
         }
@@ -186,6 +194,10 @@ pub struct Film {
     window: [u32; 4],
     pixels: Vec<Pixel>,
     features: Vec<FeatureSums>,
+    /// Light from walks that started at lights, once there is any.
+    splats: Option<splat::Sums>,
+    /// Pieces of work merged, and their samples.
+    pieces: (u64, u64),
 }
 
 /// One pixel's estimates.
@@ -224,6 +236,8 @@ impl Film {
             } else {
                 Vec::new()
             },
+            splats: None,
+            pieces: (0, 0),
         }
     }
 
@@ -235,9 +249,22 @@ impl Film {
         ]
     }
 
-    /// Adds a finished buffer.
-    pub fn merge(&mut self, mut b: Buffer) {
+    /// Adds a finished buffer; `filter` spreads its splats.
+    pub fn merge(&mut self, mut b: Buffer, filter: &Filter) {
         b.end_batch();
+        let samples: u64 = b.pixels.iter().map(|p| u64::from(p.samples)).sum();
+        if !b.splats.is_empty() && self.splats.is_none() {
+            // Pieces that came before had none to give: they count as well.
+            let pieces = self.pieces;
+            let mut sums = splat::Sums::new(self.pixels.len());
+            sums.skip(pieces.0, pieces.1);
+            self.splats = Some(sums);
+        }
+        if let Some(sums) = &mut self.splats {
+            sums.add(&b.splats, self.window, filter, samples);
+        }
+        self.pieces.0 += 1;
+        self.pieces.1 += samples;
         let [width, _] = self.size();
         for (i, p) in b.pixels.iter().enumerate() {
             let x = b.min[0] - self.window[0] + i as u32 % b.width;
@@ -271,8 +298,8 @@ impl Film {
     pub fn estimate(&self, i: usize) -> Estimate {
         let p = &self.pixels[i];
         let n = f64::from(p.samples.max(1));
-        let mean = p.sum.map(|s| float(s) / n);
-        let variance = (p.batches >= 2).then(|| {
+        let mut mean = p.sum.map(|s| float(s) / n);
+        let mut variance = (p.batches >= 2).then(|| {
             let mut v = [0.0; 3];
             for lane in 0..3 {
                 let spread = (p.squares[lane] - n * mean[lane] * mean[lane]).max(0.0);
@@ -280,6 +307,14 @@ impl Film {
             }
             v
         });
+        if let Some(splats) = &self.splats {
+            let (m, v) = splats.estimate(i);
+            for lane in 0..3 {
+                mean[lane] += m[lane];
+            }
+            // A pixel's own samples and what falls on it from all others' are all but independent.
+            variance = variance.zip(v).map(|(a, b)| [0, 1, 2].map(|k| a[k] + b[k]));
+        }
         Estimate {
             mean,
             variance,
@@ -361,7 +396,7 @@ mod tests {
                 for s in w[0]..w[1] {
                     b.add(3, 4, &sample(values[s as usize])).unwrap();
                 }
-                film.merge(b);
+                film.merge(b, &Filter::Box(0.5));
             }
             film
         };
@@ -390,7 +425,7 @@ mod tests {
         assert!(b.add(2, 0, &sample(1.0)).is_err());
         assert_eq!((b.rejected, b.rejected_at), (2, Some([0, 0])));
         let mut film = Film::new([0, 0, 2, 1], false);
-        film.merge(b);
+        film.merge(b, &Filter::Box(0.5));
         assert_eq!(film.estimate(0).samples, 3);
         assert!((film.estimate(0).mean[0] - 1.0 / 3.0).abs() < 1e-12);
     }
