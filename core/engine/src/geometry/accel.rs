@@ -2,17 +2,21 @@
 
 use std::time::Instant;
 
+use glam::Vec3;
+
 use super::build;
 use super::bvh8::Node8;
 use super::input::{Geometry, GeometryError};
+use super::instance::{Instance, Place};
 use super::portable::Portable;
 use super::ray::{Hit, Ray, RaySetup};
 #[cfg(target_arch = "x86_64")]
 use super::simd::Avx2;
 use super::sphere::Ball;
-use super::surface::SurfacePoint;
-use super::traverse::{self, Candidate, Tree};
+use super::surface::{SurfacePoint, offset_origin};
+use super::traverse::{self, Candidate, Start, Tree};
 use super::triangle::Packet;
+use super::two_level::{self, Instances, Placed};
 
 /// Geometry ready for rays. Queries take `&self`, allocate nothing and may run on any number of threads.
 #[derive(Clone, Debug)]
@@ -23,18 +27,22 @@ pub struct Accel {
     tree: Tree,
     kernel: Dispatch,
     stats: AccelStats,
+    instances: Option<Box<Instances>>,
 }
 
 /// What building cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AccelStats {
-    /// Hierarchies built: 1 (a scene without surfaces has no [`Accel`]).
+    /// Hierarchies built: 1 without instances (a scene without surfaces has no [`Accel`]); with them one for the boxes and one for each
+    /// prototype besides.
     pub bvhs: usize,
-    /// Eight-wide nodes.
+    /// Instances.
+    pub instances: usize,
+    /// Eight-wide nodes of all hierarchies.
     pub nodes: usize,
-    /// Nodes on the longest path from the root.
+    /// Nodes on the longest path from a root.
     pub depth: usize,
-    /// Triangles that can be hit, those of quads included.
+    /// Triangles that can be hit, those of quads included; those of prototypes once.
     pub triangles: usize,
     /// Spheres.
     pub spheres: usize,
@@ -69,40 +77,111 @@ impl Accel {
     /// Checks `geometry` and builds the hierarchy over it.
     ///
     /// `Ok(None)` if nothing can be hit: no shapes, or nothing but triangles with equal vertices. Then nothing is built.
+    ///
+    /// # Errors
+    /// What is wrong with the geometry.
     pub fn build(geometry: Geometry) -> Result<Option<Self>, GeometryError> {
+        Self::build_instanced(geometry, Vec::new(), &[])
+    }
+
+    /// As [`Accel::build`], with copies of prototypes. Hits number shapes through: those of `geometry`, then for every instance
+    /// those of its prototype (see [`Accel::instance_of`]).
+    ///
+    /// # Errors
+    /// What is wrong with the geometry, a prototype or an instance. Errors of prototypes name the shape within the prototype: check
+    /// them with [`Geometry::check`] before to know which.
+    pub fn build_instanced(
+        geometry: Geometry,
+        prototypes: Vec<Geometry>,
+        instances: &[Instance],
+    ) -> Result<Option<Self>, GeometryError> {
         let start = Instant::now();
         geometry.check()?;
-        let (primitives, degenerate_triangles) = build::primitives(&geometry);
-        let spheres = primitives.iter().filter(|p| p.is_ball()).count();
-        let triangles = primitives.len() - spheres;
-        let Some(tree) = build::build(&primitives) else {
+        let (primitives, degenerate) = build::primitives(&geometry);
+        let instances = Instances::build(prototypes, instances, geometry.shapes.len())?;
+        let tree = build::build(&primitives);
+        drop(primitives);
+        if tree.is_none() && instances.is_none() {
             return Ok(None);
-        };
-        let mut first = vec![0];
-        let mut total = 0;
-        for shape in &geometry.shapes {
-            total += shape.primitives() as u32;
-            first.push(total);
         }
-        let stats = AccelStats {
-            bvhs: 1,
-            nodes: tree.nodes.len(),
-            depth: tree.depth,
-            triangles,
-            spheres,
-            degenerate_triangles,
-            bytes: size_of::<Node8>() * tree.nodes.len()
-                + size_of::<Packet>() * tree.packets.len()
-                + size_of::<Ball>() * tree.balls.len(),
-            build_seconds: start.elapsed().as_secs_f64(),
+        let mut stats = AccelStats {
+            degenerate_triangles: degenerate,
+            ..AccelStats::default()
         };
+        let further = instances.iter().flat_map(|i| i.trees());
+        for tree in tree.iter().chain(further) {
+            stats.bvhs += 1;
+            stats.nodes += tree.nodes.len();
+            stats.depth = stats.depth.max(tree.depth);
+            stats.triangles += tree.packets.iter().map(Packet::count).sum::<usize>();
+            stats.spheres += tree.balls.len();
+            stats.bytes += size_of::<Node8>() * tree.nodes.len()
+                + size_of::<Packet>() * tree.packets.len()
+                + size_of::<Ball>() * tree.balls.len();
+        }
+        if let Some(i) = &instances {
+            stats.instances = i.count();
+            stats.bytes += i.bytes();
+            stats.degenerate_triangles += i.degenerate_triangles;
+        }
+        stats.build_seconds = start.elapsed().as_secs_f64();
         Ok(Some(Self {
+            first: geometry.first_primitives(),
             geometry,
-            first,
-            tree,
+            // If everything stands in instances, rays have the loose shapes behind them at once.
+            tree: tree.unwrap_or_else(Tree::nothing),
             kernel: Dispatch::detect(),
             stats,
+            instances: instances.map(Box::new),
         }))
+    }
+
+    /// The instance, and the shape within its prototype, that a hit's or a surface point's `shape` stands for; `None` if it is one
+    /// of [`Accel::geometry`].
+    #[inline]
+    pub fn instance_of(&self, shape: u32) -> Option<(u32, u32)> {
+        self.instances.as_ref()?.decode(shape)
+    }
+
+    /// The number that hits have for the first shape of an instance; 0 without instances.
+    pub fn first_shape(&self, instance: u32) -> u32 {
+        self.instances
+            .as_ref()
+            .map_or(0, |i| i.first_shape(instance))
+    }
+
+    /// Corners of a box around all instances.
+    pub fn instance_bounds(&self) -> Option<(Vec3, Vec3)> {
+        let (min, max) = self.instances.as_ref()?.bounds();
+        Some((min.into(), max.into()))
+    }
+
+    /// Bound on the rounding error, along each axis, of points on `shape` that were not found by a ray, beyond what rounding them to
+    /// f32 does: 0 unless it stands for a shape of an instance, which lies within `reach` of the origin of its space along each axis.
+    pub fn surface_error(&self, shape: u32, reach: Vec3) -> Vec3 {
+        self.placed(shape)
+            .map_or(Vec3::ZERO, |p| p.surface_error(reach))
+    }
+
+    /// The segment from `o` to just before the surface at `p`, which is known to within `p_error` along each axis and has the
+    /// geometric normal `ng`; `shape` is the one that `p` lies on. `o` must have left its own surface ([`offset_origin`]).
+    ///
+    /// The direction of a segment is rounded, and so its end moves by up to half a unit in the last place of its length: what
+    /// counts as the error of `p` grows with the distance.
+    #[inline]
+    pub fn segment(&self, o: Vec3, p: Vec3, p_error: Vec3, ng: Vec3, shape: u32) -> Ray {
+        let d = p - o;
+        let mut error = p_error + d.abs() * (1.01 / 16_777_216.0);
+        if let Some(place) = self.placed(shape) {
+            error += place.end_error(p, d);
+        }
+        Ray::segment(o, offset_origin(p, error, ng, -d))
+    }
+
+    #[inline]
+    fn placed(&self, shape: u32) -> Option<&Place> {
+        let all = self.instances.as_ref()?;
+        Some(all.place(all.decode(shape)?.0))
     }
 
     /// The shapes.
@@ -135,6 +214,9 @@ impl Accel {
     /// nothing.
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
+        if self.instances.is_some() {
+            return self.closest_of_all(ray, |_| true);
+        }
         self.closest_candidate(ray, |_| true).map(|c| self.hit(&c))
     }
 
@@ -142,6 +224,9 @@ impl Accel {
     /// A sphere whose nearer hit is refused is passed altogether: filters are meant to refuse primitives, not points.
     #[inline]
     pub fn closest_with(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+        if self.instances.is_some() {
+            return self.closest_of_all(ray, accept);
+        }
         self.closest_candidate(ray, |c| accept(&self.hit(c)))
             .map(|c| self.hit(&c))
     }
@@ -149,20 +234,61 @@ impl Accel {
     /// Whether anything is hit.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.any_candidate(ray, |_| true)
+        self.any_candidate(ray, |_| true) || self.occluded_by_instance(ray, |_| true)
     }
 
     /// Whether anything is hit that `opaque` says blocks the ray. It is asked in no particular order; see
     /// [`Self::closest_with`] about spheres.
     #[inline]
     pub fn occluded_with(&self, ray: &Ray, mut opaque: impl FnMut(&Hit) -> bool) -> bool {
-        self.any_candidate(ray, |c| opaque(&self.hit(c)))
+        self.any_candidate(ray, |c| opaque(&self.hit(c))) || self.occluded_by_instance(ray, opaque)
     }
 
     /// The surface at a hit of this `ray`.
     #[inline]
     pub fn interaction(&self, hit: &Hit, ray: &Ray) -> SurfacePoint {
-        self.geometry.interaction(hit, ray)
+        match &self.instances {
+            None => self.geometry.interaction(hit, ray),
+            Some(all) => all
+                .interaction(hit, ray)
+                .unwrap_or_else(|| self.geometry.interaction(hit, ray)),
+        }
+    }
+
+    /// [`Accel::closest_with`] for a scene with instances: first the shapes that stand by themselves, then the instances up to there.
+    #[inline(never)]
+    fn closest_of_all(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
+        let loose = self
+            .closest_candidate(ray, |c| accept(&self.hit(c)))
+            .map(|c| self.hit(&c));
+        let all = self.instances.as_ref()?;
+        let setup = RaySetup::new(ray)?;
+        let limit = loose.map_or(ray.t_max, |h| h.t);
+        let accept = |p: &Placed| p.at.t < limit && accept(&all.hit(p));
+        let placed = match self.kernel {
+            #[cfg(target_arch = "x86_64")]
+            Dispatch::Avx2(k) => k.closest_instance(all, ray, &setup, limit, accept),
+            Dispatch::Portable => two_level::closest(Portable, all, ray, &setup, limit, accept),
+        };
+        placed.map(|p| all.hit(&p)).or(loose)
+    }
+
+    #[inline]
+    fn occluded_by_instance(&self, ray: &Ray, opaque: impl FnMut(&Hit) -> bool) -> bool {
+        self.instances.is_some() && self.occluded_by_some(ray, opaque)
+    }
+
+    #[inline(never)]
+    fn occluded_by_some(&self, ray: &Ray, mut opaque: impl FnMut(&Hit) -> bool) -> bool {
+        let (Some(all), Some(setup)) = (&self.instances, RaySetup::new(ray)) else {
+            return false;
+        };
+        let opaque = |p: &Placed| opaque(&all.hit(p));
+        match self.kernel {
+            #[cfg(target_arch = "x86_64")]
+            Dispatch::Avx2(k) => k.occluded_instance(all, ray, &setup, opaque),
+            Dispatch::Portable => two_level::occluded(Portable, all, ray, &setup, opaque),
+        }
     }
 
     #[inline(always)]
@@ -175,7 +301,9 @@ impl Accel {
         match self.kernel {
             #[cfg(target_arch = "x86_64")]
             Dispatch::Avx2(k) => k.closest(&self.tree, &setup, accept),
-            Dispatch::Portable => traverse::closest(Portable, &self.tree, &setup, accept),
+            Dispatch::Portable => {
+                traverse::closest(Portable, &self.tree, &setup, Start::of(&setup), accept)
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 use super::bvh8::{Bounds, Child, Node8};
-use super::collapse::{Plan, Step};
+use super::collapse::{MAX_LEAF, Plan, Step};
 use super::input::Geometry;
 use super::sphere::{self, Ball};
 use super::traverse::{MAX_DEPTH, Tree};
@@ -34,6 +34,8 @@ pub(super) struct Primitive {
 pub(super) enum Item {
     Triangle([[f32; 3]; 3]),
     Ball(Ball),
+    /// Alone in its leaf.
+    Instance,
 }
 
 impl Primitive {
@@ -89,6 +91,19 @@ fn distinct([a, b, c]: &[[f32; 3]; 3]) -> bool {
     a != b && b != c && c != a
 }
 
+/// The hierarchy over the boxes of instances, given with their numbers; `None` if there are none.
+pub(super) fn build_top(boxes: &[(u32, Bounds)]) -> Option<Tree> {
+    let primitives: Vec<Primitive> = boxes
+        .iter()
+        .map(|&(number, bounds)| Primitive {
+            bounds,
+            number,
+            item: Item::Instance,
+        })
+        .collect();
+    build_to(&primitives, MAX_COST_DEPTH)
+}
+
 /// The hierarchy over `primitives`; `None` if there are none.
 pub(super) fn build(primitives: &[Primitive]) -> Option<Tree> {
     build_to(primitives, MAX_COST_DEPTH)
@@ -100,12 +115,15 @@ fn build_to(primitives: &[Primitive], cost_depth: usize) -> Option<Tree> {
         return None;
     }
     let binary = build_binary(primitives);
-    let plan = Plan::new(&binary, |i| primitives[i as usize].is_ball());
+    let alone = matches!(primitives[0].item, Item::Instance);
+    let most = if alone { 1 } else { MAX_LEAF };
+    let plan = Plan::new(&binary, most, |i| primitives[i as usize].is_ball());
     let mut layout = Layout {
         primitives,
         binary: &binary,
         plan: &plan,
         cost_depth,
+        alone,
         tree: Tree {
             nodes: Vec::with_capacity(primitives.len() / 6 + 1),
             packets: Vec::with_capacity(primitives.len() / 3 + 1),
@@ -163,6 +181,8 @@ struct Layout<'a> {
     binary: &'a Bvh2,
     plan: &'a Plan,
     cost_depth: usize,
+    /// Primitives are instances.
+    alone: bool,
     tree: Tree,
 }
 
@@ -201,7 +221,8 @@ impl Layout<'_> {
                 self.primitives[i as usize].is_ball() == self.primitives[p[0] as usize].is_ball()
             })
         };
-        if prims.len() <= LANES && same_kind(prims) {
+        let most = if self.alone { 1 } else { LANES };
+        if prims.len() <= most && same_kind(prims) {
             return self.leaf(prims);
         }
         self.tree.depth = self.tree.depth.max(depth);
@@ -224,6 +245,7 @@ impl Layout<'_> {
             let p = &self.primitives[p as usize];
             bounds.include(&p.bounds);
             match p.item {
+                Item::Instance => return (Child::leaf(true, p.number as usize, 1), p.bounds),
                 Item::Ball(ball) => self.tree.balls.push(ball),
                 Item::Triangle(vertices) => {
                     if i % LANES == 0 {
@@ -251,7 +273,7 @@ mod tests {
     use super::super::input::{Quad, Shape, Sphere};
     use super::super::portable::Portable;
     use super::super::ray::{Ray, RaySetup};
-    use super::super::traverse::closest;
+    use super::super::traverse::{Start, closest};
     use super::*;
 
     /// Subtrees split by count give the same hits as those split by cost, and keep the depth within bounds.
@@ -288,8 +310,11 @@ mod tests {
             for _ in 0..2000 {
                 let o: Vec3 = vector() * 2.0;
                 let ray = RaySetup::new(&Ray::new(o, vector() - o)).unwrap();
-                let expected = closest(Portable, &by_cost, &ray, |_| true);
-                assert_eq!(closest(Portable, &by_count, &ray, |_| true), expected);
+                let expected = closest(Portable, &by_cost, &ray, Start::of(&ray), |_| true);
+                assert_eq!(
+                    closest(Portable, &by_count, &ray, Start::of(&ray), |_| true),
+                    expected
+                );
                 hits += usize::from(expected.is_some());
             }
             assert!(hits > 500);
@@ -329,9 +354,9 @@ mod tests {
         tree.nodes.push(root);
         tree.depth = MAX_DEPTH;
         let ray = RaySetup::new(&Ray::new(vec3(0.1, 0.2, 3.0), -Vec3::Z)).unwrap();
-        let hit = closest(Portable, &tree, &ray, |_| true).unwrap();
+        let hit = closest(Portable, &tree, &ray, Start::of(&ray), |_| true).unwrap();
         assert!((hit.t - 3.0).abs() < 1e-6 && hit.prim / 2 == 0, "{hit:?}");
-        assert!(closest(Portable, &tree, &ray, |_| false).is_none());
+        assert!(closest(Portable, &tree, &ray, Start::of(&ray), |_| false).is_none());
         assert!(super::super::traverse::occluded(
             Portable,
             &tree,

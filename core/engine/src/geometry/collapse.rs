@@ -17,7 +17,7 @@ const NODE_COST: f32 = 1.0;
 /// also save memory traffic.
 const PACKET_COST: f32 = 0.3;
 /// Most primitives in one leaf: two packets of triangles, or as many spheres.
-const MAX_LEAF: u32 = 2 * LANES as u32;
+pub(super) const MAX_LEAF: u32 = 2 * LANES as u32;
 
 /// What becomes of a binary node: a leaf of the wide hierarchy, or a node of it.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +43,8 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub fn new(binary: &Bvh2, is_ball: impl Fn(u32) -> bool) -> Self {
+    /// `most`: how many primitives a leaf may have, at most [`MAX_LEAF`].
+    pub fn new(binary: &Bvh2, most: u32, is_ball: impl Fn(u32) -> bool) -> Self {
         let mut entries = vec![Entry::default(); binary.nodes.len()];
         for &n in preorder(binary).iter().rev() {
             let node = &binary.nodes[n as usize];
@@ -60,7 +61,7 @@ impl Plan {
                 }
             } else {
                 let children = node.first_index as usize;
-                combine(area, &entries[children], &entries[children + 1])
+                combine(area, most, &entries[children], &entries[children + 1])
             };
         }
         Self { entries }
@@ -137,7 +138,7 @@ fn preorder(binary: &Bvh2) -> Vec<u32> {
     order
 }
 
-fn combine(area: f32, left: &Entry, right: &Entry) -> Entry {
+fn combine(area: f32, most: u32, left: &Entry, right: &Entry) -> Entry {
     let mut e = Entry {
         triangles: left.triangles + right.triangles,
         balls: left.balls + right.balls,
@@ -159,7 +160,7 @@ fn combine(area: f32, left: &Entry, right: &Entry) -> Entry {
     e.left[6] = k;
     e.cost[0] = area * NODE_COST + below;
     let count = e.triangles + e.balls;
-    if count <= MAX_LEAF && (e.triangles == 0 || e.balls == 0) {
+    if count <= most && (e.triangles == 0 || e.balls == 0) {
         let tests = if e.balls > 0 {
             e.balls
         } else {

@@ -163,6 +163,26 @@ pub enum GeometryError {
         /// The position found.
         value: Vec3,
     },
+    /// An instance's transform cannot be inverted in single precision, scales beyond 1e18 or below 1e-18, or moves its prototype out
+    /// of the coordinate range.
+    #[error(
+        "instance {instance}: its transform cannot be inverted in single precision, or moves it out of the range ±1e18"
+    )]
+    Instance {
+        /// Index of the instance.
+        instance: usize,
+    },
+    /// An instance of a prototype that does not exist.
+    #[error("instance {instance}: there is no prototype {prototype}")]
+    NoPrototype {
+        /// Index of the instance.
+        instance: usize,
+        /// The prototype named.
+        prototype: u32,
+    },
+    /// More instances than shapes can be numbered in.
+    #[error("{0} instances of so many shapes; shapes of instances are numbered in 32 bits")]
+    TooManyInstances(usize),
     /// More primitives than the hierarchy can address.
     #[error("{0} primitives; at most {MAX_ITEMS} can be traced")]
     TooMany(usize),
@@ -177,6 +197,17 @@ impl Geometry {
     /// Number of primitives of all shapes.
     pub fn primitives(&self) -> usize {
         self.shapes.iter().map(Shape::primitives).sum()
+    }
+
+    /// Number of the first primitive of each shape, and the total.
+    pub(super) fn first_primitives(&self) -> Vec<u32> {
+        let mut first = vec![0];
+        let mut total = 0;
+        for shape in &self.shapes {
+            total += shape.primitives() as u32;
+            first.push(total);
+        }
+        first
     }
 
     /// Checks everything a traversal or an interaction relies on. Degenerate triangles are not errors.

@@ -20,6 +20,8 @@
 //! - [`Geometry`] is a list of [`Shape`]s: triangle meshes, spheres, quads. [`Accel::build`] checks it (bad input is a
 //!   [`GeometryError`] that names shape and index; triangles with equal vertices are left out and counted) and builds one hierarchy;
 //!   a scene with nothing to hit gives `None`.
+//! - [`Accel::build_instanced`] adds copies of prototypes: every prototype has a hierarchy of its own, and one over the copies'
+//!   boxes leads to them (`instance`, `two_level`). Without copies neither exists, and queries are those of one hierarchy.
 //! - [`Accel::closest`] and [`Accel::occluded`] answer rays; `*_with` take a filter, for surfaces that light passes as if they
 //!   were not there. [`Accel::interaction`] gives the surface at a hit, [`SurfacePoint::spawn`] or [`offset_origin`] the next
 //!   ray's origin, and [`Ray::segment`] tests visibility between two offset points.
@@ -36,6 +38,7 @@ mod build;
 mod bvh8;
 mod collapse;
 mod input;
+mod instance;
 mod portable;
 mod ray;
 #[cfg(target_arch = "x86_64")]
@@ -44,8 +47,10 @@ mod sphere;
 mod surface;
 mod traverse;
 mod triangle;
+mod two_level;
 
 pub use accel::{Accel, AccelStats};
 pub use input::{Geometry, GeometryError, Quad, Shape, Sphere, TriangleMesh};
+pub use instance::Instance;
 pub use ray::{Hit, MAX_COORDINATE, Ray};
 pub use surface::{SurfacePoint, offset_origin};

@@ -7,9 +7,10 @@ use std::arch::x86_64::*;
 
 use super::bvh8::{Child, Node8};
 use super::portable::{Kernel, Near, decide};
-use super::ray::RaySetup;
-use super::traverse::{self, Candidate, Tree};
+use super::ray::{Ray, RaySetup};
+use super::traverse::{self, Candidate, Start, Tree};
 use super::triangle::{Packet, PacketHits, TINY_DET, gamma};
+use super::two_level::{self, Instances, Placed};
 
 /// Proof that the processor has AVX2: only [`Avx2::detect`] makes one.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +34,33 @@ impl Avx2 {
         unsafe { closest_avx2(self, tree, ray, accept) }
     }
 
+    /// [`two_level::closest`], compiled for AVX2.
+    #[inline(always)]
+    pub fn closest_instance<F: FnMut(&Placed) -> bool>(
+        self,
+        all: &Instances,
+        ray: &Ray,
+        setup: &RaySetup,
+        limit: f32,
+        accept: F,
+    ) -> Option<Placed> {
+        // SAFETY: `self` proves that AVX2 is available.
+        unsafe { closest_instance_avx2(self, all, ray, setup, limit, accept) }
+    }
+
+    /// [`two_level::occluded`], compiled for AVX2.
+    #[inline(always)]
+    pub fn occluded_instance<F: FnMut(&Placed) -> bool>(
+        self,
+        all: &Instances,
+        ray: &Ray,
+        setup: &RaySetup,
+        opaque: F,
+    ) -> bool {
+        // SAFETY: `self` proves that AVX2 is available.
+        unsafe { occluded_instance_avx2(self, all, ray, setup, opaque) }
+    }
+
     /// [`traverse::occluded`], compiled for AVX2.
     #[inline(always)]
     pub fn occluded<F: FnMut(&Candidate) -> bool>(
@@ -53,7 +81,7 @@ fn closest_avx2<F: FnMut(&Candidate) -> bool>(
     ray: &RaySetup,
     accept: F,
 ) -> Option<Candidate> {
-    traverse::closest(k, tree, ray, accept)
+    traverse::closest(k, tree, ray, Start::of(ray), accept)
 }
 
 #[target_feature(enable = "avx2")]
@@ -64,6 +92,29 @@ fn occluded_avx2<F: FnMut(&Candidate) -> bool>(
     opaque: F,
 ) -> bool {
     traverse::occluded(k, tree, ray, opaque)
+}
+
+#[target_feature(enable = "avx2")]
+fn closest_instance_avx2<F: FnMut(&Placed) -> bool>(
+    k: Avx2,
+    all: &Instances,
+    ray: &Ray,
+    setup: &RaySetup,
+    limit: f32,
+    accept: F,
+) -> Option<Placed> {
+    two_level::closest(k, all, ray, setup, limit, accept)
+}
+
+#[target_feature(enable = "avx2")]
+fn occluded_instance_avx2<F: FnMut(&Placed) -> bool>(
+    k: Avx2,
+    all: &Instances,
+    ray: &Ray,
+    setup: &RaySetup,
+    opaque: F,
+) -> bool {
+    two_level::occluded(k, all, ray, setup, opaque)
 }
 
 impl Kernel for Avx2 {

@@ -10,10 +10,10 @@ use super::triangle::{Packet, PacketHits};
 pub(super) const MAX_DEPTH: usize = 36;
 
 /// Each level leaves at most seven siblings behind.
-const DEEP_STACK: usize = 7 * MAX_DEPTH + 1;
+pub(super) const DEEP_STACK: usize = 7 * MAX_DEPTH + 1;
 
 /// Enough for depth 9. Clearing the stack is a measurable part of a ray, hence two sizes.
-const SHALLOW_STACK: usize = 64;
+pub(super) const SHALLOW_STACK: usize = 64;
 
 /// What is traversed: nodes from the root (index 0), triangle packets, spheres.
 #[derive(Clone, Debug)]
@@ -25,6 +25,18 @@ pub(super) struct Tree {
     pub depth: usize,
 }
 
+impl Tree {
+    /// A tree that no ray meets.
+    pub fn nothing() -> Self {
+        Self {
+            nodes: vec![Node8::EMPTY],
+            packets: Vec::new(),
+            balls: Vec::new(),
+            depth: 1,
+        }
+    }
+}
+
 /// A hit on primitive `prim`, numbered through all shapes of the geometry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Candidate {
@@ -34,21 +46,42 @@ pub(super) struct Candidate {
     pub v: f32,
 }
 
+/// What a search for the nearest hit has to beat.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Start {
+    /// Hits beyond this are ignored; not beyond the ray's own end.
+    pub t: f32,
+    /// Hits at exactly `t` count.
+    pub ties: bool,
+}
+
+impl Start {
+    /// The whole ray.
+    #[inline(always)]
+    pub fn of(ray: &RaySetup) -> Self {
+        Self {
+            t: ray.t_max,
+            ties: false,
+        }
+    }
+}
+
 /// Nearest accepted hit; of hits at equal t the one with the lowest primitive number, whatever the order of traversal.
 #[inline(always)]
 pub(super) fn closest<K: Kernel, F>(
     k: K,
     tree: &Tree,
     ray: &RaySetup,
+    start: Start,
     accept: F,
 ) -> Option<Candidate>
 where
     F: FnMut(&Candidate) -> bool,
 {
     if 7 * tree.depth < SHALLOW_STACK {
-        closest_sized::<K, F, SHALLOW_STACK>(k, tree, ray, accept)
+        closest_sized::<K, F, SHALLOW_STACK>(k, tree, ray, start, accept)
     } else {
-        closest_sized::<K, F, DEEP_STACK>(k, tree, ray, accept)
+        closest_sized::<K, F, DEEP_STACK>(k, tree, ray, start, accept)
     }
 }
 
@@ -68,7 +101,7 @@ where
 /// Stack entry: entry distance in the upper half, child in the lower, so that entries compare by distance. Distances are not
 /// negative, and the bits of such floats are ordered like their values.
 #[inline(always)]
-fn entry(near: f32, child: Child) -> u64 {
+pub(super) fn entry(near: f32, child: Child) -> u64 {
     u64::from(near.to_bits()) << 32 | u64::from(child.0)
 }
 
@@ -77,6 +110,7 @@ fn closest_sized<K: Kernel, F, const N: usize>(
     k: K,
     tree: &Tree,
     ray: &RaySetup,
+    start: Start,
     mut accept: F,
 ) -> Option<Candidate>
 where
@@ -84,8 +118,8 @@ where
 {
     // prim 0 makes "equal t, lower number" false for a hit exactly at t_max, which is excluded.
     let mut best = Candidate {
-        t: ray.t_max,
-        prim: 0,
+        t: start.t,
+        prim: if start.ties { u32::MAX } else { 0 },
         u: 0.0,
         v: 0.0,
     };

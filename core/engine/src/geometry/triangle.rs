@@ -59,6 +59,11 @@ impl Packet {
         prim: [u32::MAX; LANES],
     };
 
+    /// Triangles in it.
+    pub fn count(&self) -> usize {
+        self.prim.iter().filter(|p| **p != u32::MAX).count()
+    }
+
     pub fn set(&mut self, lane: usize, triangle: [[f32; 3]; 3], prim: u32) {
         for (rows, vertex) in self.v.iter_mut().zip(triangle) {
             for (row, x) in rows.iter_mut().zip(vertex) {
