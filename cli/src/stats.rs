@@ -217,6 +217,7 @@ fn geometry(scene: &Scene) -> Value {
     let s = scene.accel().map(|a| a.stats()).unwrap_or_default();
     json!({
         "bvhs": s.bvhs,
+        "instances": s.instances,
         "nodes": s.nodes,
         "depth": s.depth,
         "triangles": s.triangles,

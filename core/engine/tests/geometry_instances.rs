@@ -413,10 +413,10 @@ fn wrong_instances_are_errors() {
     assert!(empty.unwrap().is_none());
 }
 
-/// Many copies (a million with RESOLVENT_FULL_TESTS set): seconds to build, under 200 bytes each, hits in the right copy.
+/// Many copies (a million with RESOLVENT_FULL set): seconds to build, under 200 bytes each, hits in the right copy.
 #[test]
 fn a_million() {
-    let n = if std::env::var_os("RESOLVENT_FULL_TESTS").is_some() {
+    let n = if std::env::var_os("RESOLVENT_FULL").is_some() {
         100
     } else {
         40

@@ -11,6 +11,7 @@ mod harness;
 mod judge;
 mod scenes;
 
+mod instances;
 mod points;
 mod slab_flux;
 mod slab_radiance;

@@ -156,13 +156,6 @@ impl Accel {
         Some((min.into(), max.into()))
     }
 
-    /// Bound on the rounding error, along each axis, of points on `shape` that were not found by a ray, beyond what rounding them to
-    /// f32 does: 0 unless it stands for a shape of an instance, which lies within `reach` of the origin of its space along each axis.
-    pub fn surface_error(&self, shape: u32, reach: Vec3) -> Vec3 {
-        self.placed(shape)
-            .map_or(Vec3::ZERO, |p| p.surface_error(reach))
-    }
-
     /// The segment from `o` to just before the surface at `p`, which is known to within `p_error` along each axis and has the
     /// geometric normal `ng`; `shape` is the one that `p` lies on. `o` must have left its own surface ([`offset_origin`]).
     ///
@@ -181,7 +174,7 @@ impl Accel {
     #[inline]
     fn placed(&self, shape: u32) -> Option<&Place> {
         let all = self.instances.as_ref()?;
-        Some(all.place(all.decode(shape)?.0))
+        all.place(all.decode(shape)?.0)
     }
 
     /// The shapes.

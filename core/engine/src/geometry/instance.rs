@@ -182,12 +182,6 @@ impl Place {
         let size = back(p.as_dvec3() - self.translation()) + 4.0 * back(d.as_dvec3());
         (ROUND * self.outward(size)).as_vec3()
     }
-
-    /// Bound on the rounding error of surface points of this copy that were not found by a ray, for a prototype within `reach`
-    /// of the origin of its space along each axis.
-    pub fn surface_error(&self, reach: Vec3) -> Vec3 {
-        (2.0 * ROUND * self.outward(reach.as_dvec3())).as_vec3()
-    }
 }
 
 /// Normal of the triangle hit, in f64: a transform that stretches multiplies the error of a rounded one. `None` if it has none.

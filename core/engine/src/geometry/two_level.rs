@@ -103,17 +103,16 @@ impl Instances {
         self.base + instance * self.stride
     }
 
-    pub fn place(&self, instance: u32) -> &Place {
-        &self.places[instance as usize]
+    pub fn place(&self, instance: u32) -> Option<&Place> {
+        self.places.get(instance as usize)
     }
 
     pub fn hit(&self, placed: &Placed) -> Hit {
-        let shape_prim = self.prototypes[self.place(placed.instance).prototype as usize]
-            .as_ref()
-            .map(|p| {
-                let shape = p.first.partition_point(|&f| f <= placed.at.prim) - 1;
-                (shape as u32, placed.at.prim - p.first[shape])
-            });
+        let prototype = self.places[placed.instance as usize].prototype;
+        let shape_prim = self.prototypes[prototype as usize].as_ref().map(|p| {
+            let shape = p.first.partition_point(|&f| f <= placed.at.prim) - 1;
+            (shape as u32, placed.at.prim - p.first[shape])
+        });
         let (shape, prim) = shape_prim.unwrap_or_default();
         Hit {
             t: placed.at.t,

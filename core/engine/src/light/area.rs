@@ -19,6 +19,8 @@ pub struct Area {
     pub form: AreaShape,
     /// Surface area.
     pub area: f32,
+    /// Further magnitudes of terms that made its coordinates, see [`AreaPoint::size`].
+    pub terms: Vec3,
 }
 
 /// A point on an emitting shape.
@@ -66,6 +68,7 @@ impl Area {
             two_sided,
             form: AreaShape::Quad(quad),
             area,
+            terms: Vec3::ZERO,
         }
     }
 
@@ -78,6 +81,7 @@ impl Area {
             two_sided: false,
             form: AreaShape::Sphere(sphere),
             area,
+            terms: Vec3::ZERO,
         }
     }
 
@@ -99,7 +103,14 @@ impl Area {
             two_sided: false,
             form: AreaShape::Mesh(mesh, distribution),
             area,
+            terms: Vec3::ZERO,
         }
+    }
+
+    /// As part of an instance: its coordinates are sums of terms of this magnitude, too.
+    pub fn made_of(mut self, terms: Vec3) -> Self {
+        self.terms = terms;
+        self
     }
 
     /// Radiant power, W.
@@ -146,6 +157,7 @@ impl Area {
                 (s.center + n * s.radius, size, n, 0)
             }
         };
+        let size = size + self.terms;
         Some(AreaPoint { p, size, ng, prim })
     }
 
@@ -188,7 +200,7 @@ impl Area {
         let n = (-off - w * half).normalize_or_zero();
         let at = AreaPoint {
             p: s.center + n * s.radius,
-            size: s.center.abs() + Vec3::splat(s.radius),
+            size: s.center.abs() + Vec3::splat(s.radius) + self.terms,
             ng: n,
             prim: 0,
         };

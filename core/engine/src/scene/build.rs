@@ -1,5 +1,6 @@
 //! From a description to a scene: plugins, geometry, lights, and the facts that choose the kernels.
 
+use super::instances::{Copies, Groups, emits};
 use super::shapes::{Wide, affine};
 use super::{Material, PlacedMedium, Surface};
 use crate::camera::Camera;
@@ -36,7 +37,9 @@ pub struct Preparation {
 /// A scene, ready to be rendered.
 pub struct Scene {
     pub(crate) accel: Option<Accel>,
+    /// Behind the shapes that stand by themselves; see [`Scene::surface`].
     pub(crate) surfaces: Vec<Surface>,
+    pub(crate) copies: Copies,
     pub(crate) has_null_surfaces: bool,
     /// All media absorb only.
     pub(crate) fades: bool,
@@ -66,16 +69,14 @@ impl Scene {
     pub fn build(scene: &describe::Scene, registry: &Registry) -> Result<Self> {
         let start = Instant::now();
         let lanes = RGB_LANES;
-        if !scene.instances.is_empty() {
-            return Err(Error::Input("instances cannot be traced".into()));
-        }
         let wide: Vec<Wide> = scene
             .shapes
             .iter()
             .map(|s| Wide::read(scene, &s.geometry))
             .collect::<Result<_>>()?;
+        let groups = Groups::read(scene)?;
         let camera_to_world = affine(&scene.camera.to_world());
-        let centre = centre(scene, &wide, camera_to_world.translation);
+        let centre = centre(scene, &wide, &groups, camera_to_world.translation);
         let to_local = Affine::from_translation(-centre);
 
         let mut materials = Vec::new();
@@ -124,9 +125,9 @@ impl Scene {
         let mut lights: Vec<Light> = Vec::new();
         let mut surfaces = Vec::new();
         let mut shapes = Vec::new();
-        for (described, wide) in scene.shapes.iter().zip(wide) {
-            let shape = wide.narrow(centre);
-            let material = match &described.material {
+        // What stands behind a shape, emission aside; the material of an instance replaces its own.
+        let mut behind = |described: &describe::Shape, replaced: Option<&str>| -> Result<Surface> {
+            let material = match replaced.or(described.material.as_deref()) {
                 Some(name) => Some(material(name, scene, registry, lanes, &mut materials)?),
                 None => None,
             };
@@ -135,29 +136,29 @@ impl Scene {
                 .as_deref()
                 .and_then(|name| scene.media.get_index_of(name))
                 .and_then(|k| media_of[k]);
-            let filled = described.interior.is_some();
-            let light = described
-                .emission
-                .filter(|e| e.iter().any(|v| *v > 0.0))
-                .map(|e| {
-                    lights.push(Light::Area(area(&shape, shapes.len() as u32, spectrum(e))));
-                    lights.len() as u32 - 1
-                });
-            let null = light.is_none()
-                && match material {
-                    None => filled,
+            Ok(Surface {
+                material,
+                light: None,
+                interior,
+                null: match material {
+                    None => described.interior.is_some(),
                     Some(m) => materials_null(&materials, m),
-                };
-            if null && interior.is_none() {
+                },
+            })
+        };
+        for (described, wide) in scene.shapes.iter().zip(wide) {
+            let shape = wide.narrow(centre);
+            let mut surface = behind(described, None)?;
+            if let Some(e) = described.emission.filter(|_| emits(described)) {
+                lights.push(Light::Area(area(&shape, shapes.len() as u32, spectrum(e))));
+                surface.light = Some(lights.len() as u32 - 1);
+                surface.null = false;
+            }
+            if surface.null && surface.interior.is_none() {
                 // It changes nothing: leave it out of the hierarchy.
                 continue;
             }
-            surfaces.push(Surface {
-                material,
-                light,
-                interior,
-                null,
-            });
+            surfaces.push(surface);
             shapes.push(shape);
         }
         for light in &scene.lights {
@@ -195,8 +196,20 @@ impl Scene {
             }
         }
         // Area lights without area never shine.
-        let accel = Accel::build(Geometry { shapes })
+        let (prototypes, placed) = groups.geometry(centre)?;
+        let accel = Accel::build_instanced(Geometry { shapes }, prototypes, &placed)
             .map_err(|e| Error::Input(format!("{}: {e}", scene.source.file.display())))?;
+        let copies = match &accel {
+            Some(accel) if accel.stats().instances > 0 => {
+                groups.surfaces(accel, &placed, &mut behind, |described, shape, at, size| {
+                    let radiance = spectrum(described.emission.unwrap_or_default());
+                    lights.push(Light::Area(area(shape, at, radiance).made_of(size)));
+                    lights.len() as u32 - 1
+                })?
+            }
+            _ => Copies::default(),
+        };
+        drop((groups, placed));
         let geometry_seconds = geometry_start.elapsed().as_secs_f64();
 
         let mut bounds = Aabb::EMPTY;
@@ -205,6 +218,9 @@ impl Scene {
         }
         if let Some(accel) = &accel {
             bounds = shapes_bounds(accel.geometry(), bounds);
+            if let Some((lo, hi)) = accel.instance_bounds() {
+                bounds = bounds.including(lo).including(hi);
+            }
         }
         let radius = (0.5 * bounds.extent().length()).max(f32::MIN_POSITIVE);
         let center = if bounds.is_empty() {
@@ -224,7 +240,7 @@ impl Scene {
             c.focus_distance,
             Filter::new(scene.film.filter),
         );
-        let has_null_surfaces = surfaces.iter().any(|s| s.null);
+        let has_null_surfaces = surfaces.iter().chain(copies.surfaces()).any(|s| s.null);
         let fades = media.iter().all(absorbs_only);
         let chromatic = media.iter().any(|m| is_chromatic(m, lanes));
         let mut traits = traits(&media, accel.is_some(), &lights);
@@ -239,6 +255,7 @@ impl Scene {
         let mut built = Self {
             accel,
             surfaces,
+            copies,
             has_null_surfaces,
             fades,
             chromatic,
@@ -263,6 +280,22 @@ impl Scene {
     /// How many primitives can be hit, 0 without a hierarchy.
     pub fn accel(&self) -> Option<&Accel> {
         self.accel.as_ref()
+    }
+
+    /// What stands behind a shape, numbered as in hits.
+    #[inline(always)]
+    pub(crate) fn surface(&self, shape: u32) -> &Surface {
+        match self.surfaces.get(shape as usize) {
+            Some(surface) => surface,
+            None => self.copied_surface(shape),
+        }
+    }
+
+    #[inline(never)]
+    fn copied_surface(&self, shape: u32) -> &Surface {
+        let place = self.accel.as_ref().and_then(|a| a.instance_of(shape));
+        let (instance, shape) = place.unwrap_or_default();
+        self.copies.surface(instance, shape)
     }
 
     /// How many lights there are.
@@ -313,8 +346,9 @@ fn spectrum(rgb: [f64; 3]) -> Spectrum {
 }
 
 /// The middle of what stands at a finite place: relative to it, coordinates keep their digits.
-fn centre(scene: &describe::Scene, shapes: &[Wide], camera: DVec3) -> DVec3 {
+fn centre(scene: &describe::Scene, shapes: &[Wide], groups: &Groups, camera: DVec3) -> DVec3 {
     let mut boxes: Vec<(DVec3, DVec3)> = shapes.iter().filter_map(Wide::bounds).collect();
+    boxes.extend(groups.boxes());
     for m in scene.media.values() {
         // A medium's own bounds are known only once it is made; its place is what keeps far-away scenes precise.
         let t = affine(&m.transform).translation;

@@ -1,6 +1,7 @@
 //! The scene: built once from its description, planned once, then only read.
 
 mod build;
+mod instances;
 mod media;
 mod shapes;
 mod transport;
@@ -12,6 +13,7 @@ pub use view::{Counters, View};
 use crate::plugin::{ForeignBsdf, ForeignMedium};
 
 /// What stands behind a shape.
+#[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Index of its material; none absorbs everything.
     pub material: Option<u32>,

@@ -12,7 +12,8 @@ pub(super) fn affine(t: &Transform) -> Affine {
     Affine::from_rows([m[0], m[1], m[2]])
 }
 
-/// A shape in world coordinates, still in double precision.
+/// A shape in world coordinates, or in those of its prototype, still in double precision.
+#[derive(Clone)]
 pub(super) enum Wide {
     Sphere(DVec3, f64),
     Quad([DVec3; 3]),

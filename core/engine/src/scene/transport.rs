@@ -41,17 +41,22 @@ impl Scene {
     /// The interior media behind a shape's surface, seen in direction `d`.
     #[inline(always)]
     fn cross(&self, shape: u32, ng: Vec3, d: Vec3, inside: u64) -> u64 {
-        match self.surfaces[shape as usize].interior {
+        match self.surface(shape).interior {
             Some(m) if ng.dot(d) < 0.0 => inside | 1 << m,
             Some(m) => inside & !(1 << m),
             None => inside,
         }
     }
 
+    fn has_interiors(&self) -> bool {
+        let all = self.surfaces.iter().chain(self.copies.surfaces());
+        all.into_iter().any(|s| s.interior.is_some())
+    }
+
     /// The interior media at a point: the boundaries a ray from there leaves without having entered.
     pub(super) fn interiors_at(&self, p: Vec3) -> u64 {
         let Some(accel) = &self.accel else { return 0 };
-        if self.surfaces.iter().all(|s| s.interior.is_none()) {
+        if !self.has_interiors() {
             return 0;
         }
         // A direction without symmetry, so that edges of axis-aligned shapes are not met.
@@ -62,7 +67,7 @@ impl Scene {
                 break;
             };
             let at = accel.interaction(&hit, &ray);
-            if let Some(m) = self.surfaces[hit.shape as usize].interior {
+            if let Some(m) = self.surface(hit.shape).interior {
                 if at.ng.dot(ray.d) < 0.0 {
                     entered |= 1 << m;
                 } else if entered >> m & 1 == 0 {
@@ -87,11 +92,9 @@ impl Scene {
                 .map_or("isotropic scattering".into(), |p| p.title());
             return format!("{title} in the medium '{}' at {:?}:", m.name, v.p);
         }
-        match self
-            .surfaces
-            .get(v.primitive[0] as usize)
-            .and_then(|s| s.material)
-        {
+        let shape = v.primitive[0];
+        let material = (shape != NONE).then(|| self.surface(shape).material);
+        match material.flatten() {
             Some(m) => {
                 let m = &self.materials[m as usize];
                 format!(
@@ -201,7 +204,7 @@ impl View<'_> {
             edge.length += hit.t;
             let at = self.scene.accel.as_ref().map(|a| a.interaction(&hit, &ray));
             let Some(at) = at else { return Ok(false) };
-            if !self.scene.surfaces[hit.shape as usize].null {
+            if !self.scene.surface(hit.shape).null {
                 next.inside = inside;
                 return self.surface_vertex(&at, d, next);
             }
@@ -296,7 +299,7 @@ impl View<'_> {
         d: Vec3,
         next: &mut Vertex,
     ) -> Result<bool, Status> {
-        let surface = &self.scene.surfaces[at.shape as usize];
+        let surface = self.scene.surface(at.shape);
         next.kind = VertexKind::Surface as u32;
         next.flags = 0;
         next.p = at.p.into();
@@ -411,7 +414,7 @@ impl View<'_> {
         for boundary in 0..MAX_BOUNDARIES {
             let hit = accel.closest(&ray);
             if let Some(h) = &hit
-                && !self.scene.surfaces[h.shape as usize].null
+                && !self.scene.surface(h.shape).null
             {
                 return Ok(false);
             }
@@ -454,12 +457,12 @@ impl View<'_> {
             return Ray::new(o, to.wi.into());
         }
         let (p, ng) = (Vec3::from(to.p), Vec3::from(to.ng));
-        let end = if to.flags & vertex_flags::DELTA != 0 {
-            p
-        } else {
-            offset_origin(p, to.p_error.into(), ng, o - p)
-        };
-        Ray::segment(o, end)
+        match &self.scene.accel {
+            Some(accel) if to.flags & vertex_flags::DELTA == 0 => {
+                accel.segment(o, p, to.p_error.into(), ng, to.primitive[0])
+            }
+            _ => Ray::segment(o, p),
+        }
     }
 
     /// Approximate optical depth of a connection.
