@@ -7,6 +7,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bidirectional;
+pub mod features;
 pub mod measure;
 pub mod mis;
 pub mod roulette;

@@ -120,6 +120,156 @@ impl Throughput {
     }
 }
 
+/// How the densities of all strategies make a weight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heuristic {
+    /// q_s / Σ q (Veach 1997, eq. 9.8).
+    Balance,
+    /// q_s² / Σ q² (Veach 1997, eq. 9.13 with β = 2).
+    Power,
+}
+
+/// The densities of a whole path x_0 … x_n, x_0 on a light and x_n on the sensor, under all strategies: strategy s takes
+/// x_0 … x_{s−1} from a walk that starts at a light, the others from one that starts at the sensor, and connects the two.
+///
+/// With L_i the density of x_i found from x_{i−1} and S_i found from x_{i+1}, and with lane densities `track` and `ratio` on
+/// every edge, strategy s has the density, lane by lane,
+///
+///   q_s(λ) = n_s Π_{i<s} L_i Π_{i≥s} S_i · Π_{e≠s−1} track_e(λ) · ratio_{s−1}(λ) · Π_media σ_t(λ)
+///
+/// because a flight produces null collisions with density `track`, a connection with `ratio`, and every collision vertex is
+/// found by a flight from one side or the other (Miller et al. 2019, §5; flat arrays as in Veach 1997, §10.2.1).
+#[derive(Clone, Debug, Default)]
+pub struct Strategies {
+    /// L_i, per area or volume.
+    pub from_light: Vec<f64>,
+    /// S_i, per area or volume.
+    pub from_sensor: Vec<f64>,
+    /// Vertices of delta events, which cannot be connected to.
+    pub delta: Vec<bool>,
+    /// ratio/track of the edge from x_i to x_{i+1}.
+    pub rho: Vec<Spectrum>,
+    /// Density of x_0 when it is chosen as seen from x_1: strategy 1.
+    pub chosen: f64,
+    /// Walks from lights for each walk from a pixel: n_s of strategy n, which finds all pixels alike.
+    pub light_walks: f64,
+}
+
+/// Smallest density a division is done with; below it, a strategy does not exist.
+const TINY: f64 = 1e-200;
+
+impl Strategies {
+    /// Makes room for a path of `n` edges.
+    pub fn resize(&mut self, n: usize) {
+        self.from_light.clear();
+        self.from_light.resize(n + 1, 0.0);
+        self.from_sensor.clear();
+        self.from_sensor.resize(n + 1, 0.0);
+        self.delta.clear();
+        self.delta.resize(n + 1, false);
+        self.rho.clear();
+        self.rho.resize(n, Spectrum::ONE);
+    }
+
+    /// Number of edges.
+    fn edges(&self) -> usize {
+        self.rho.len()
+    }
+
+    /// What strategy `k` has beside the products of L and S: 0 if it cannot be.
+    fn extra(&self, k: usize) -> f64 {
+        let n = self.edges();
+        if k == 0 {
+            return 1.0;
+        }
+        // A light seen directly is left to the walk from the sensor.
+        if n == 1 || self.delta[k - 1] || self.delta[k] {
+            return 0.0;
+        }
+        let chosen = if k == 1 {
+            self.chosen / self.from_light[0].max(TINY)
+        } else {
+            1.0
+        };
+        let walks = if k == n { self.light_walks } else { 1.0 };
+        chosen * walks
+    }
+
+    /// Calls `visit(k, q_k/q_s)` for all strategies, lanes left out.
+    pub fn relative(&self, s: usize, mut visit: impl FnMut(usize, f64)) {
+        let quotient = |a: f64, b: f64| if b > 0.0 { a / b } else { 0.0 };
+        let own = self.extra(s).max(TINY);
+        visit(s, 1.0);
+        let mut g = 1.0 / own;
+        for k in (0..s).rev() {
+            let light = if k == 0 {
+                self.from_light[0].max(TINY)
+            } else {
+                self.from_light[k]
+            };
+            g *= quotient(self.from_sensor[k], light);
+            visit(k, g * self.extra(k));
+        }
+        g = 1.0 / own;
+        for k in s..self.edges() {
+            let light = if k == 0 {
+                self.from_light[0].max(TINY)
+            } else {
+                self.from_light[k]
+            };
+            g *= quotient(light, self.from_sensor[k]);
+            visit(k + 1, g * self.extra(k + 1));
+        }
+    }
+
+    /// What strategy `s` divides contribution over its own grey density by, for a path whose walks and connection have the
+    /// lane densities `track` (all edges' track and all collisions' σ_t).
+    pub fn divisor(&self, s: usize, track: Spectrum, lanes: u32, heuristic: Heuristic) -> f64 {
+        let lane_mean = |rho: Spectrum| {
+            let mut sum = 0.0;
+            for lane in 0..lanes as usize {
+                sum += f64::from(track[lane]) * f64::from(rho[lane]);
+            }
+            sum / f64::from(lanes)
+        };
+        let q = |k: usize, d: f64| {
+            let rho = if k == 0 {
+                Spectrum::ONE
+            } else {
+                self.rho[k - 1]
+            };
+            if d > 0.0 { d * lane_mean(rho) } else { 0.0 }
+        };
+        match heuristic {
+            Heuristic::Balance => {
+                let mut sum = 0.0;
+                self.relative(s, |k, d| sum += q(k, d));
+                sum
+            }
+            Heuristic::Power => {
+                let (mut sum, own) = (0.0, q(s, 1.0));
+                self.relative(s, |k, d| sum += q(k, d).powi(2));
+                if own > 0.0 { sum / own } else { f64::INFINITY }
+            }
+        }
+    }
+}
+
+/// Smallest lane density of an edge that is told from 0.
+const LEAST_TRACK: f32 = 1e-30;
+
+/// The lane densities of an edge under flights, kept from 0 so that they can be divided by.
+#[inline(always)]
+pub fn track(edge: &Edge) -> Spectrum {
+    edge.track.map(|t| t.max(LEAST_TRACK))
+}
+
+/// ratio/track of an edge.
+#[inline(always)]
+pub fn rho(edge: &Edge) -> Spectrum {
+    edge.ratio.zip(track(edge), |r, t| r / t)
+}
+
 /// An edge that nothing hinders.
 pub fn clear(length: f32) -> Edge {
     let f = Flight::vacuum(length);

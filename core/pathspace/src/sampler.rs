@@ -13,14 +13,24 @@ pub use crate::sobol::BATCH;
 const NET_BOUNCES: u32 = 2;
 
 /// What a group of numbers is for.
-#[derive(Clone, Copy)]
-enum Purpose {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Film and lens.
     Camera = 0,
+    /// A free flight.
     Flight = 1,
+    /// A direction, and a roulette.
     Scatter = 2,
+    /// A light and a point on it.
     Light = 3,
+    /// A transmittance.
     Connection = 4,
+    /// A branch of the walk.
     Branch = 5,
+    /// The vertex a light walk starts from.
+    Emission = 6,
+    /// The direction it starts in, and a point on the lens.
+    Ray = 7,
 }
 
 /// The numbers of one sample of one pixel.
@@ -62,9 +72,33 @@ impl Sampler {
         }
     }
 
+    /// The numbers of a walk from a light: unrelated to those of the walk from the sensor, but with the same hero.
     #[inline(always)]
-    fn four(&self, bounce: u32, purpose: Purpose) -> [f32; 4] {
-        let dimension = (bounce * 8 + purpose as u32) as u64;
+    pub fn light_walk(&self) -> Self {
+        let purpose = 0x6c69_6768_7400_0000;
+        Self {
+            batch_key: derive(self.batch_key, purpose),
+            sample_key: derive(self.sample_key, purpose),
+            ..*self
+        }
+    }
+
+    /// The lane that leads.
+    #[inline(always)]
+    pub fn hero(&self) -> u32 {
+        self.hero
+    }
+
+    /// A key for streams of any length.
+    #[inline(always)]
+    pub fn key(&self, purpose: u64) -> u64 {
+        derive(self.sample_key, purpose)
+    }
+
+    /// Four numbers for a purpose at a bounce.
+    #[inline(always)]
+    pub fn four(&self, bounce: u32, purpose: Purpose) -> [f32; 4] {
+        let dimension = u64::from(bounce) * 8 + purpose as u64;
         if bounce < NET_BOUNCES {
             let [a, b, c, d] = sobol::point(self.index, derive(self.batch_key, 0x2000 + dimension));
             [unit(a), unit(b), unit(c), unit(d)]
@@ -105,7 +139,7 @@ impl Sampler {
         FlightDraws {
             key: derive(
                 self.sample_key,
-                0x4000_0000 + (bounce * 8 + purpose as u32) as u64,
+                0x4000_0000 + u64::from(bounce) * 8 + purpose as u64,
             ),
             tau,
             event,

@@ -60,7 +60,7 @@ impl Chooser {
     }
 
     /// Probability of choosing light `i`.
-    pub(super) fn probability(&self, i: u32) -> f32 {
+    pub(crate) fn probability(&self, i: u32) -> f32 {
         self.probability.get(i as usize).copied().unwrap_or(0.0)
     }
 

@@ -261,6 +261,9 @@ unsafe extern "C" fn light_density(
     let (v, reference, found) = unsafe { (view(ctx), &*reference, &*found) };
     let in_medium = reference.is(VertexKind::Medium);
     let lights = &v.scene.lights;
+    if found.flags & vertex_flags::DELTA != 0 {
+        return lights.chooser(in_medium).probability(found.light);
+    }
     if found.flags & vertex_flags::INFINITE != 0 {
         return lights.environment(in_medium, found.position()).1;
     }

@@ -17,7 +17,7 @@ use resolvent_api::vertex::{Edge, vertex_flags};
 use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
 use resolvent_pathspace::mis::Throughput;
 use resolvent_pathspace::sampler::Sampler;
-use resolvent_pathspace::{roulette, scatter};
+use resolvent_pathspace::{features, roulette, scatter};
 
 /// What paths are made with.
 pub struct Kernel<'a> {
@@ -64,7 +64,7 @@ impl Kernel<'_> {
         &self,
         sampler: &Sampler,
         pixel: [u32; 2],
-        features: bool,
+        wants_features: bool,
     ) -> Outcome<PixelSample> {
         let mut out = PixelSample::default();
         let lanes = self.scene.lanes();
@@ -86,16 +86,8 @@ impl Kernel<'_> {
         let mut edge = Edge::default();
         let flight = sampler.flight(0, walk.beta.p);
         let alive = self.scene.emerge(&ray, &flight, &mut edge, next)?;
-        if alive && !next.is(VertexKind::Emitter) {
-            out.alpha = 1.0;
-            if features {
-                describe(&mut out, next, edge.length);
-            }
-        } else if edge.media != 0 {
-            // What absorbs only covers by what it takes away.
-            let clear = edge.value.mean(lanes) / edge.track.mean(lanes);
-            out.alpha = (1.0 - clear).max(0.0);
-        }
+        let met = alive.then_some(&*next);
+        features::fill(&mut out, met, &edge, lanes, wants_features);
         out.radiance = if self.sun.is_some() {
             self.follow::<CHROMATIC, true>(walk, sampler, alive, &mut edge, here, next)?
         } else {
@@ -314,26 +306,4 @@ fn survives<const CHROMATIC: bool>(walk: &mut Walk, chance: f32, lanes: u32) -> 
         walk.beta.f *= 1.0 / q;
     }
     true
-}
-
-/// Depth, albedo and normal of the first vertex.
-fn describe(out: &mut PixelSample, v: &Vertex, length: f32) {
-    out.depth = length;
-    if v.is(VertexKind::Medium) {
-        let albedo = v
-            .sigma_s
-            .zip(v.sigma_t, |s, t| if t > 0.0 { s / t } else { 0.0 });
-        out.albedo = albedo.to_rgb();
-        return;
-    }
-    out.normal = v.frame.n;
-    // Directional albedo for light from the normal's side, with one sample per path: f·|cos|/density.
-    let wo = v.frame.to_local(Vec3::from(v.wo));
-    let u = resolvent_api::ScatterDraws {
-        lobe: 0.5,
-        dir: [0.3, 0.7],
-    };
-    if let Some(s) = v.scatter.sample(wo, u, Mode::Radiance) {
-        out.albedo = s.weight.to_rgb();
-    }
 }

@@ -1,0 +1,408 @@
+//! Connections: the strategies of a path, their contribution and their weight.
+
+use super::draws::{Draws, End};
+use super::subpath::{Subpath, conversion};
+use crate::mis::{self, Heuristic, Strategies};
+use crate::sampler::Purpose;
+use crate::{measure, roulette, scatter};
+use resolvent_api::integrator::Outcome;
+use resolvent_api::operator::{Mode, ScatterEval};
+use resolvent_api::vertex::{Edge, LightSample, NONE, vertex_flags};
+use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
+
+/// Light that falls on the film from a walk that started at a light.
+#[derive(Clone, Copy, Debug)]
+pub struct Splat {
+    /// Where, pixels.
+    pub film: [f32; 2],
+    /// Weighted contribution per walk.
+    pub radiance: Spectrum,
+}
+
+/// Two walks and what connects them; storage is kept between paths.
+pub struct Bidirectional {
+    /// From the sensor.
+    pub sensor: Subpath,
+    /// From a light.
+    pub light: Subpath,
+    /// The densities of the last connection's path.
+    pub strategies: Strategies,
+    /// How weights are made.
+    pub heuristic: Heuristic,
+    /// The strategy that finds a path is the only one, and weighs 1: particle tracing, or scenes whose lights are only met.
+    pub alone: bool,
+}
+
+/// The densities that a connection changes: of the two vertices it joins and of their neighbours, seen across it.
+#[derive(Clone, Copy, Default)]
+struct Across {
+    /// L of the vertex on the sensor's side, and of the one beyond.
+    light: [f64; 2],
+    /// S of the vertex on the light's side, and of the one beyond.
+    sensor: [f64; 2],
+}
+
+impl Bidirectional {
+    /// Two walks not begun; `light_walks` walks from lights go with each from a pixel.
+    pub fn new(light_walks: f64, heuristic: Heuristic) -> Self {
+        Self {
+            sensor: Subpath::default(),
+            light: Subpath::default(),
+            strategies: Strategies {
+                light_walks,
+                ..Strategies::default()
+            },
+            heuristic,
+            alone: false,
+        }
+    }
+
+    /// Strategy s = 0: the walk from the sensor met a light at its vertex `t − 1`.
+    pub fn hit(&mut self, scene: &SceneView<'_>, t: usize) -> Outcome<Spectrum> {
+        let nodes = self.sensor.nodes();
+        let node = &nodes[t - 1];
+        let v = &node.vertex;
+        if v.flags & vertex_flags::EMITS == 0 || v.is(VertexKind::Medium) {
+            return Ok(Spectrum::ZERO);
+        }
+        let f = node.beta.f * v.emitted;
+        if t == 2 || self.alone {
+            return Ok(f / node.beta.p.mean(scene.lanes()));
+        }
+        let before = &nodes[t - 2].vertex;
+        let [position, direction] = scene.emission_density(v, before)?;
+        let w = towards(v, before);
+        let chosen = f64::from(scene.light_density(before, v)) * conversion(before, v, -w);
+        let across = Across {
+            light: [
+                f64::from(position),
+                f64::from(direction) * conversion(v, before, w),
+            ],
+            sensor: [0.0; 2],
+        };
+        let p = node.beta.p;
+        self.assemble(0, t, &across, chosen, None);
+        Ok(self.weigh(0, f, p, scene.lanes()))
+    }
+
+    /// Strategy s = 1: vertex `t − 1` of the walk from the sensor connects to a light chosen as seen from there.
+    pub fn next_event<D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        t: usize,
+        draws: &mut D,
+    ) -> Outcome<Spectrum> {
+        let nodes = self.sensor.nodes();
+        let node = &nodes[t - 1];
+        let z = &node.vertex;
+        if z.is(VertexKind::Emitter) || !measure::is_connectible(z) {
+            return Ok(Spectrum::ZERO);
+        }
+        let [a, b, choice, chance] = draws.four(End::Sensor, t as u32 - 2, Purpose::Light);
+        let Some(light) = scene.sample_light(z, choice, [a, b])? else {
+            return Ok(Spectrum::ZERO);
+        };
+        let wi = Vec3::from(light.wi);
+        let e = scatter::eval(scene, z, wi, Mode::Radiance)?;
+        if e.f.is_zero() {
+            return Ok(Spectrum::ZERO);
+        }
+        let mut f = node.beta.f * e.f * light.radiance * (1.0 / light.density);
+        if z.is(VertexKind::Medium) {
+            // As in path tracing: a peaked phase function rarely faces the light.
+            let q = roulette::connection(e.f.max_lane());
+            if q < 1.0 {
+                if chance >= q {
+                    return Ok(Spectrum::ZERO);
+                }
+                f *= 1.0 / q;
+            }
+        }
+        let Some(edge) = scene.connect(z, &light, &draws.connection(1, t as u32))? else {
+            return Ok(Spectrum::ZERO);
+        };
+        let x = emitter(&light);
+        let [position, direction] = scene.emission_density(&x, z)?;
+        let delta = light.flags & vertex_flags::DELTA != 0;
+        let to_light = if delta { 1.0 } else { conversion(z, &x, wi) };
+        let across = Across {
+            light: [
+                f64::from(direction) * conversion(&x, z, -wi),
+                reverse_at(&e, z, &nodes[t - 2].vertex),
+            ],
+            sensor: [
+                if delta {
+                    0.0
+                } else {
+                    f64::from(e.forward) * to_light
+                },
+                0.0,
+            ],
+        };
+        let chosen = f64::from(light.density) * to_light;
+        let p = node.beta.p * mis::track(&edge);
+        self.assemble(1, t, &across, chosen, Some(&edge));
+        self.strategies.from_light[0] = f64::from(position);
+        Ok(self.weigh(1, f * edge.value, p, scene.lanes()))
+    }
+
+    /// A strategy s ≥ 2, t ≥ 2: vertex `s − 1` of the walk from the light connects to vertex `t − 1` of the other.
+    pub fn join<D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        s: usize,
+        t: usize,
+        draws: &mut D,
+    ) -> Outcome<Spectrum> {
+        let (ys, zs) = (self.light.nodes(), self.sensor.nodes());
+        let (ny, nz) = (&ys[s - 1], &zs[t - 1]);
+        let (y, z) = (&ny.vertex, &nz.vertex);
+        if z.is(VertexKind::Emitter) || !measure::is_connectible(z) || !measure::is_connectible(y) {
+            return Ok(Spectrum::ZERO);
+        }
+        let to = (y.position() - z.position()).as_dvec3();
+        let d2 = to.length_squared();
+        if !(d2 > 0.0) {
+            return Ok(Spectrum::ZERO);
+        }
+        let w = (to / d2.sqrt()).as_vec3();
+        let ez = scatter::eval(scene, z, w, Mode::Radiance)?;
+        if ez.f.is_zero() {
+            return Ok(Spectrum::ZERO);
+        }
+        let ey = scatter::eval(scene, y, -w, Mode::Importance)?;
+        if ey.f.is_zero() {
+            return Ok(Spectrum::ZERO);
+        }
+        let target = target(y, w, d2.sqrt() as f32);
+        let u = draws.connection(s as u32, t as u32);
+        let Some(edge) = scene.connect(z, &target, &u)? else {
+            return Ok(Spectrum::ZERO);
+        };
+        let across = Across {
+            light: [
+                f64::from(ey.forward) * conversion(y, z, w),
+                reverse_at(&ez, z, &zs[t - 2].vertex),
+            ],
+            sensor: [
+                f64::from(ez.forward) * conversion(z, y, w),
+                reverse_at(&ey, y, &ys[s - 2].vertex),
+            ],
+        };
+        let f = ny.beta.f * nz.beta.f * ey.f * ez.f * edge.value * (1.0 / d2) as f32;
+        let p = ny.beta.p * nz.beta.p * mis::track(&edge);
+        self.assemble(s, t, &across, 0.0, Some(&edge));
+        self.start_from_light(scene)?;
+        Ok(self.weigh(s, f, p, scene.lanes()))
+    }
+
+    /// Strategy t = 1: vertex `s − 1` of the walk from the light connects to the lens. For s = 1 the light itself is seen.
+    pub fn project<D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        s: usize,
+        draws: &mut D,
+    ) -> Outcome<Option<Splat>> {
+        let ys = self.light.nodes();
+        let ny = &ys[s - 1];
+        let y = &ny.vertex;
+        if s > 1 && !measure::is_connectible(y) {
+            return Ok(None);
+        }
+        let lens = draws.four(End::Light, s as u32 - 1, Purpose::Ray);
+        let Some(sensor) = scene.sense(y, [lens[2], lens[3]])? else {
+            return Ok(None);
+        };
+        let wi = Vec3::from(sensor.target.wi);
+        let z = Vertex {
+            kind: VertexKind::Sensor as u32,
+            p: sensor.target.p,
+            ..Vertex::empty()
+        };
+        let (start, e) = if s == 1 {
+            (
+                Spectrum::splat((1.0 / ny.forward) as f32),
+                shown(scene, y, &z)?,
+            )
+        } else {
+            (ny.beta.f, scatter::eval(scene, y, wi, Mode::Importance)?)
+        };
+        if e.f.is_zero() {
+            return Ok(None);
+        }
+        let u = draws.connection(s as u32, 1);
+        let Some(edge) = scene.connect(y, &sensor.target, &u)? else {
+            return Ok(None);
+        };
+        let d2 = f64::from(sensor.target.distance).powi(2);
+        let importance = f64::from(sensor.target.density);
+        let f = start * e.f * edge.value * (importance / d2) as f32;
+        let p = ny.beta.p * mis::track(&edge);
+        let radiance = if self.alone {
+            f / (p * mis::rho(&edge)).mean(scene.lanes())
+        } else {
+            let across = Across {
+                light: [0.0; 2],
+                sensor: [
+                    importance * conversion(&z, y, wi),
+                    if s > 1 {
+                        reverse_at(&e, y, &ys[s - 2].vertex)
+                    } else {
+                        0.0
+                    },
+                ],
+            };
+            self.assemble(s, 1, &across, 0.0, Some(&edge));
+            self.start_from_light(scene)?;
+            self.weigh(s, f, p, scene.lanes())
+        };
+        Ok(Some(Splat {
+            film: sensor.film,
+            radiance,
+        }))
+    }
+
+    /// Density of the light's vertex when it is chosen as seen from the next, for strategies s ≥ 2.
+    fn start_from_light(&mut self, scene: &SceneView<'_>) -> Outcome<()> {
+        let ys = self.light.nodes();
+        let (x, y) = (&ys[0].vertex, &ys[1].vertex);
+        let delta = x.flags & vertex_flags::DELTA != 0;
+        let w = towards(x, y);
+        self.strategies.chosen = if delta {
+            f64::from(scene.light_density(y, x))
+        } else {
+            f64::from(scene.light_density(y, x)) * conversion(y, x, -w)
+        };
+        if delta {
+            self.strategies.from_sensor[0] = 0.0;
+        }
+        Ok(())
+    }
+
+    /// Fills the densities of the path of strategy (s, t).
+    fn assemble(
+        &mut self,
+        s: usize,
+        t: usize,
+        across: &Across,
+        chosen: f64,
+        connection: Option<&Edge>,
+    ) {
+        let (ys, zs) = (self.light.nodes(), self.sensor.nodes());
+        let n = s + t - 1;
+        let out = &mut self.strategies;
+        out.resize(n);
+        out.chosen = chosen;
+        // Strategy 1 has no walk from a light: its vertex there is new.
+        let walked = if s > 1 { s } else { 0 };
+        for (i, y) in ys.iter().enumerate().take(walked) {
+            out.from_light[i] = y.forward;
+            out.from_sensor[i] = y.reverse;
+            out.delta[i] = y.delta && i + 1 < s;
+            if i > 0 {
+                out.rho[i - 1] = mis::rho(&y.edge);
+            }
+        }
+        let seen = if t > 1 { t } else { 0 };
+        for (j, z) in zs.iter().enumerate().take(seen) {
+            let i = n - j;
+            out.from_sensor[i] = z.forward;
+            out.from_light[i] = z.reverse;
+            out.delta[i] = z.delta && j + 1 < t;
+            if j > 0 {
+                out.rho[i] = mis::rho(&z.edge);
+            }
+        }
+        for (k, l) in across.light.into_iter().enumerate() {
+            // With s = 0, the first of the two is the light's own vertex.
+            if s + k <= n {
+                out.from_light[s + k] = l;
+            }
+        }
+        for (k, p) in across.sensor.into_iter().enumerate() {
+            if s > k {
+                out.from_sensor[s - 1 - k] = p;
+            }
+        }
+        if let (Some(edge), true) = (connection, s > 0) {
+            out.rho[s - 1] = mis::rho(edge);
+        }
+    }
+
+    /// The contribution `f` over the densities of all strategies.
+    fn weigh(&self, s: usize, f: Spectrum, p: Spectrum, lanes: u32) -> Spectrum {
+        let divisor = self.strategies.divisor(s, p, lanes, self.heuristic);
+        if divisor > 0.0 {
+            f * (1.0 / divisor) as f32
+        } else {
+            Spectrum::ZERO
+        }
+    }
+}
+
+/// Unit direction from one vertex to the next; towards a vertex at infinity, or away from it.
+fn towards(from: &Vertex, to: &Vertex) -> Vec3 {
+    if from.is_infinite() {
+        -from.position()
+    } else if to.is_infinite() {
+        to.position()
+    } else {
+        (to.position() - from.position()).normalize_or_zero()
+    }
+}
+
+/// The density per area or volume at which `v` would find the vertex before it, coming across the connection.
+fn reverse_at(e: &ScatterEval, v: &Vertex, before: &Vertex) -> f64 {
+    f64::from(e.reverse) * conversion(v, before, Vec3::from(v.wo))
+}
+
+/// A vertex as the end of a connection that comes along `w`.
+fn target(v: &Vertex, w: Vec3, distance: f32) -> LightSample {
+    let surface = v.is(VertexKind::Surface);
+    LightSample {
+        wi: w.into(),
+        distance,
+        radiance: Spectrum::ONE,
+        density: 1.0,
+        light: NONE,
+        // A point in space has no surface of its own to be kept from.
+        flags: if surface { 0 } else { vertex_flags::DELTA },
+        p: v.p,
+        ng: v.ng,
+        primitive: v.primitive,
+        p_error: v.p_error,
+    }
+}
+
+/// The vertex of a point chosen on a light.
+fn emitter(light: &LightSample) -> Vertex {
+    let infinite = light.flags & vertex_flags::INFINITE != 0;
+    let delta = light.flags & vertex_flags::DELTA != 0;
+    let surface = !infinite && !delta;
+    let kind = if surface {
+        VertexKind::Surface
+    } else {
+        VertexKind::Emitter
+    };
+    Vertex {
+        kind: kind as u32,
+        flags: light.flags | vertex_flags::EMITS,
+        p: if infinite { light.wi } else { light.p },
+        p_error: light.p_error,
+        light: light.light,
+        ng: light.ng,
+        primitive: light.primitive,
+        emitted: light.radiance,
+        ..Vertex::empty()
+    }
+}
+
+/// Radiance of the light's vertex `y` towards the sensor `z`, times its cosine, as if it had scattered.
+fn shown(scene: &SceneView<'_>, y: &Vertex, z: &Vertex) -> Outcome<ScatterEval> {
+    let mut e = ScatterEval::default();
+    // Lights without extent can't be seen; others show only the sides that they send rays from.
+    if y.is(VertexKind::Surface) && scene.emission_density(y, z)?[1] > 0.0 {
+        e.f = y.emitted * y.cosine(towards(y, z));
+    }
+    Ok(e)
+}

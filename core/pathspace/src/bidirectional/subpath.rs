@@ -1,0 +1,263 @@
+//! Subpaths as data: the vertices of a walk from the sensor or from a light, with the densities at which either end finds them.
+
+use super::draws::{Draws, End};
+use crate::mis::Throughput;
+use crate::sampler::Purpose;
+use crate::{roulette, scatter};
+use resolvent_api::integrator::Outcome;
+use resolvent_api::operator::{Mode, ScatterSample};
+use resolvent_api::vertex::{CameraRay, Edge};
+use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
+
+/// A vertex of a subpath.
+#[derive(Clone, Copy)]
+pub struct Node {
+    /// The vertex; its `wo` points to the one before.
+    pub vertex: Vertex,
+    /// The edge from the vertex before.
+    pub edge: Edge,
+    /// Contribution over density, up to and including the collision here, before scattering.
+    pub beta: Throughput,
+    /// Density, per area or volume, at which the vertex before found this one.
+    pub forward: f64,
+    /// Density, per area or volume, at which the vertex after would find this one; known once that has scattered.
+    pub reverse: f64,
+    /// The walk was turned by a delta lobe here: nothing can be connected to.
+    pub delta: bool,
+}
+
+static CLEAR: Edge = Edge {
+    value: Spectrum::ONE,
+    track: Spectrum::ONE,
+    ratio: Spectrum::ONE,
+    emitted: Spectrum::ZERO,
+    length: 0.0,
+    media: 0,
+};
+
+impl Node {
+    fn new() -> Self {
+        Self {
+            vertex: Vertex::empty(),
+            edge: Edge::default(),
+            beta: Throughput::ONE,
+            forward: 0.0,
+            reverse: 0.0,
+            delta: false,
+        }
+    }
+}
+
+/// A walk; its storage is kept between paths.
+#[derive(Default)]
+pub struct Subpath {
+    nodes: Vec<Node>,
+    len: usize,
+    /// Radiance that media emit along the walk (walks from the sensor).
+    pub emitted: Spectrum,
+}
+
+impl Subpath {
+    /// The vertices.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes[..self.len]
+    }
+
+    /// The vertex after the start, if one was met, and the edge towards it.
+    pub fn first(&self) -> (Option<&Vertex>, &Edge) {
+        let met = (self.len > 1).then(|| &self.nodes[1].vertex);
+        (met, self.nodes.get(1).map_or(&CLEAR, |n| &n.edge))
+    }
+
+    /// Number of vertices.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// True if the walk did not begin.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Forgets the walk.
+    pub fn clear(&mut self) {
+        self.len = 0;
+        self.emitted = Spectrum::ZERO;
+    }
+
+    fn push(&mut self) -> usize {
+        if self.len == self.nodes.len() {
+            self.nodes.push(Node::new());
+        }
+        self.len += 1;
+        self.len - 1
+    }
+
+    /// Walks from the sensor along `ray` until `limit` vertices, the sensor among them.
+    pub fn from_sensor<const CHROMATIC: bool, D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        ray: &CameraRay,
+        draws: &mut D,
+        limit: usize,
+    ) -> Outcome<()> {
+        self.clear();
+        let first = self.push();
+        let node = &mut self.nodes[first];
+        node.vertex = Vertex {
+            kind: VertexKind::Sensor as u32,
+            p: ray.o,
+            ..Vertex::empty()
+        };
+        node.beta = Throughput::ONE;
+        node.beta.f *= ray.weight;
+        // The place on the lens is chosen alike by all techniques: its density cancels.
+        node.forward = 1.0;
+        node.reverse = 1.0;
+        node.delta = false;
+        self.walk::<CHROMATIC, D>(scene, End::Sensor, ray, ray.density, draws, limit)
+    }
+
+    /// Walks from a light until `limit` vertices, the one on the light among them.
+    pub fn from_light<const CHROMATIC: bool, D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        draws: &mut D,
+        limit: usize,
+    ) -> Outcome<()> {
+        self.clear();
+        let first = self.push();
+        let [a, b, choice, _] = draws.four(End::Light, 0, Purpose::Emission);
+        let [c, d, ..] = draws.four(End::Light, 0, Purpose::Ray);
+        let node = &mut self.nodes[first];
+        let Some(start) = scene.emit(choice, [a, b], [c, d], &mut node.vertex)? else {
+            self.len = 0;
+            return Ok(());
+        };
+        node.beta = Throughput::ONE;
+        node.beta.f *= start.weight;
+        node.forward = f64::from(start.position);
+        node.reverse = 0.0;
+        node.delta = false;
+        let ray = CameraRay {
+            o: start.o,
+            d: start.d,
+            weight: 1.0,
+            inside: start.inside,
+            ..CameraRay::default()
+        };
+        self.walk::<CHROMATIC, D>(scene, End::Light, &ray, start.direction, draws, limit)
+    }
+
+    fn walk<const CHROMATIC: bool, D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        end: End,
+        ray: &CameraRay,
+        density: f32,
+        draws: &mut D,
+        limit: usize,
+    ) -> Outcome<()> {
+        let lanes = scene.lanes();
+        let mode = match end {
+            End::Sensor => Mode::Radiance,
+            End::Light => Mode::Importance,
+        };
+        // Weights count relative to the start: what a light gives is neither small nor large.
+        let scale = self.nodes[0].beta.f.max_lane();
+        if !(scale > 0.0) {
+            return Ok(());
+        }
+        let mut beta = self.nodes[0].beta;
+        let mut density = f64::from(density);
+        let mut direction = Vec3::from(ray.d);
+        for bounce in 0u32.. {
+            if self.len >= limit {
+                break;
+            }
+            let at = self.push();
+            let (before, rest) = self.nodes.split_at_mut(at);
+            let (from, node) = (&mut before[at - 1], &mut rest[0]);
+            let flight = draws.flight(end, bounce, beta.p);
+            let alive = if bounce == 0 {
+                scene.emerge(ray, &flight, &mut node.edge, &mut node.vertex)?
+            } else {
+                let (edge, next) = (&mut node.edge, &mut node.vertex);
+                scene.propagate(&from.vertex, direction, &flight, edge, next)?
+            };
+            if end == End::Sensor {
+                self.emitted += beta.f * node.edge.emitted;
+            }
+            let arrived = alive && (end == End::Sensor || !node.vertex.is(VertexKind::Emitter));
+            if !arrived {
+                self.len -= 1;
+                break;
+            }
+            beta.travel::<CHROMATIC>(&node.edge);
+            node.forward = density * conversion(&from.vertex, &node.vertex, direction);
+            node.delta = false;
+            node.reverse = 0.0;
+            if node.vertex.is(VertexKind::Medium) {
+                let v = &node.vertex;
+                beta.collide::<CHROMATIC>(v.sigma_t, v.sigma_s, lanes);
+            }
+            node.beta = beta;
+            if node.vertex.is(VertexKind::Emitter) || beta.f.is_zero() || self.len >= limit {
+                break;
+            }
+            let (u, chance) = draws.scatter(end, bounce);
+            let Some(s) = scatter::sample(scene, &node.vertex, u, mode)? else {
+                break;
+            };
+            let wi = Vec3::from(s.wi);
+            let (forward, reverse) = turn(&node.vertex, &s);
+            node.delta = scatter::is_delta(&s);
+            from.reverse =
+                reverse * conversion(&node.vertex, &from.vertex, Vec3::from(node.vertex.wo));
+            beta.f *= s.weight;
+            let q = roulette::survival(beta.weight::<CHROMATIC>(lanes).max_lane() / scale);
+            if q < 1.0 {
+                if chance >= q {
+                    break;
+                }
+                beta.f *= 1.0 / q;
+            }
+            density = forward;
+            direction = wi;
+        }
+        Ok(())
+    }
+}
+
+/// The factor from a density per steradian at `from` to one per area or volume at `to`, which lies in direction `w`:
+/// D(to)/|x−y|² (Jakob 2013, eq. 3.14). A ray from infinity has a density per area across it; towards infinity, densities
+/// stay per steradian.
+pub fn conversion(from: &Vertex, to: &Vertex, w: Vec3) -> f64 {
+    if to.is_infinite() {
+        return 1.0;
+    }
+    let cosine = f64::from(to.cosine(w));
+    if from.is_infinite() {
+        return cosine;
+    }
+    let d2 = (to.position() - from.position())
+        .as_dvec3()
+        .length_squared();
+    if d2 > 0.0 { cosine / d2 } else { 0.0 }
+}
+
+/// Densities per steradian of a turn along the walk and against it.
+///
+/// A delta lobe is a distribution in projected solid angle with the refracted side's compressed by η²: relative to the
+/// common measure of both directions its probabilities stand over |cos θ| and, against the walk, over η² as well
+/// (Veach 1997, §10.3.5). So the weights are exact on specular chains, too.
+fn turn(v: &Vertex, s: &ScatterSample) -> (f64, f64) {
+    let (forward, reverse) = (f64::from(s.forward), f64::from(s.reverse));
+    if !scatter::is_delta(s) {
+        return (forward, reverse);
+    }
+    let n = Vec3::from(v.frame.n);
+    let cosine = |w: [f32; 3]| f64::from(n.dot(Vec3::from(w)).abs()).max(1e-12);
+    let eta = f64::from(s.eta);
+    (forward / cosine(s.wi), reverse / (cosine(v.wo) * eta * eta))
+}

@@ -1,0 +1,138 @@
+//! All strategies of a sample.
+
+use resolvent_api::abi::{PixelSample, Tile, scene_traits};
+use resolvent_api::integrator::Outcome;
+use resolvent_api::rng::Stream;
+use resolvent_api::{Output, SceneView, VertexKind};
+use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
+use resolvent_pathspace::features;
+use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::sampler::Purpose;
+
+/// What paths are made with.
+pub struct Kernel<'a> {
+    /// The scene.
+    pub scene: &'a SceneView<'a>,
+    /// Most scattering events of a path.
+    pub max_depth: u32,
+    /// Mean number of vertices of the light's walk that each of the sensor's is joined to.
+    pub connections: f32,
+    /// How weights are made.
+    pub heuristic: Heuristic,
+    /// Only strategies with this many vertices from the light, and from the sensor.
+    pub only: [Option<usize>; 2],
+}
+
+impl Kernel<'_> {
+    /// Renders a piece of work.
+    pub fn tile<const CHROMATIC: bool>(&self, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
+        let [x0, y0, x1, y1] = tile.window;
+        let walks = f64::from(x1 - x0) * f64::from(y1 - y0);
+        let mut paths = Bidirectional::new(walks, self.heuristic);
+        // Without lights worth connecting to (a constant sky around a cloud), scattering finds them.
+        paths.alone = !self.scene.has(scene_traits::LIGHTS);
+        for y in tile.min[1]..tile.max[1] {
+            for x in tile.min[0]..tile.max[0] {
+                let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
+                for i in tile.sample_begin..tile.sample_end {
+                    let mut draws = NetDraws::new(tile.seed, pixel, i, self.scene.lanes());
+                    let wants = tile.features != 0;
+                    let sample =
+                        self.sample::<CHROMATIC>(&mut paths, [x, y], &mut draws, wants, out)?;
+                    out.add(x, y, &sample)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn sample<const CHROMATIC: bool>(
+        &self,
+        paths: &mut Bidirectional,
+        pixel: [u32; 2],
+        draws: &mut NetDraws,
+        wants_features: bool,
+        out: &mut Output<'_>,
+    ) -> Outcome<PixelSample> {
+        let scene = self.scene;
+        let mut sample = PixelSample::default();
+        // A path of k scattering events has k + 2 vertices.
+        let limit = (self.max_depth as usize).saturating_add(2);
+        let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
+        if let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? {
+            paths
+                .sensor
+                .from_sensor::<CHROMATIC, _>(scene, &ray, draws, limit)?;
+            let (met, edge) = paths.sensor.first();
+            features::fill(&mut sample, met, edge, scene.lanes(), wants_features);
+        } else {
+            paths.sensor.clear();
+        }
+        if !paths.alone {
+            // The light's own vertex, and at least one that scatters.
+            let limit = limit.saturating_sub(1);
+            paths
+                .light
+                .from_light::<CHROMATIC, _>(scene, draws, limit)?;
+        } else {
+            paths.light.clear();
+        }
+        if self.wants(0, 2) {
+            sample.radiance += paths.sensor.emitted;
+        }
+        for t in 2..=paths.sensor.len() {
+            if self.wants(0, t) {
+                sample.radiance += paths.hit(scene, t)?;
+            }
+            if t < limit && self.wants(1, t) && !paths.alone {
+                sample.radiance += paths.next_event(scene, t, draws)?;
+            }
+        }
+        for s in 2..=paths.light.len() {
+            if self.wants(s, 1)
+                && let Some(splat) = paths.project(scene, s, draws)?
+            {
+                out.splat(splat.film, splat.radiance)?;
+            }
+        }
+        self.join_all(paths, draws, limit, &mut sample)?;
+        Ok(sample)
+    }
+
+    /// Joins every vertex of the sensor's walk to some of the light's. Long walks have too many pairs: each is kept with the
+    /// same probability.
+    fn join_all(
+        &self,
+        paths: &mut Bidirectional,
+        draws: &mut NetDraws,
+        limit: usize,
+        sample: &mut PixelSample,
+    ) -> Outcome<()> {
+        let inner = paths.light.len().saturating_sub(1);
+        if inner == 0 {
+            return Ok(());
+        }
+        let share = (self.connections / inner as f32).min(1.0);
+        let mut choice = Stream::new(draws.key(End::Light, 0, Purpose::Connection));
+        for t in 2..=paths.sensor.len() {
+            if paths.sensor.nodes()[t - 1].vertex.is(VertexKind::Emitter) {
+                continue;
+            }
+            for s in 2..=paths.light.len() {
+                if s + t > limit || !self.wants(s, t) {
+                    continue;
+                }
+                if share < 1.0 && choice.uniform() >= share {
+                    continue;
+                }
+                let joined = paths.join(self.scene, s, t, draws)?;
+                sample.radiance += joined * (1.0 / share);
+            }
+        }
+        Ok(())
+    }
+
+    fn wants(&self, s: usize, t: usize) -> bool {
+        self.only[0].is_none_or(|o| o == s) && self.only[1].is_none_or(|o| o == t)
+    }
+}

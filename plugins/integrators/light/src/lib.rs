@@ -1,0 +1,114 @@
+//! Particle tracing: walks start at lights alone, and every vertex is connected to the lens (Arvo 1986; Veach 1997, strategy t = 1).
+//!
+//! The independent witness of the integrators that walk from the sensor. Lights at infinity seen directly are found by the camera's ray,
+//! since no walk starts from where they are. It cannot see what no connection to the lens finds: delta reflections of the scene, and
+//! the light that media emit.
+//!
+//! | parameter | type | default | meaning |
+//! |---|---|---|---|
+//! | `max_depth` | int ≥ −1 | −1 | scattering events of a path, −1: any number. A limit makes the picture darker than it should be |
+//!
+//! ```json
+//! { "integrator": { "plugin": "light" } }
+//! ```
+
+use resolvent_api::abi::{ParamDecl, PixelSample, Tile, scene_traits};
+use resolvent_api::integrator::Outcome;
+use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView, Spectrum};
+use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
+use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::sampler::Purpose;
+
+/// The integrator.
+struct ParticleTracer {
+    max_depth: u32,
+}
+
+impl Plugin for ParticleTracer {
+    const NAME: &'static str = "light";
+    const SUMMARY: &'static str = "particle tracing from lights to the lens";
+    const PARAMS: &'static [ParamDecl] =
+        &[
+            Decl::int("max_depth", "scattering events of a path; -1: any number")
+                .default("-1")
+                .at_least(-1.0)
+                .build(),
+        ];
+
+    fn create(params: &Params<'_>) -> Result<Self, Error> {
+        let max_depth = u32::try_from(params.int("max_depth")?).unwrap_or(u32::MAX);
+        Ok(Self { max_depth })
+    }
+}
+
+impl Integrator for ParticleTracer {
+    fn render(&self, scene: &SceneView<'_>, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
+        if scene.is_grey() {
+            self.tile::<false>(scene, tile, out)
+        } else {
+            self.tile::<true>(scene, tile, out)
+        }
+    }
+}
+
+impl ParticleTracer {
+    fn tile<const CHROMATIC: bool>(
+        &self,
+        scene: &SceneView<'_>,
+        tile: &Tile,
+        out: &mut Output<'_>,
+    ) -> Outcome<()> {
+        let mut paths = Bidirectional::new(1.0, Heuristic::Balance);
+        paths.alone = true;
+        let emits = scene.has(scene_traits::LIGHTS) || scene.has(scene_traits::HITTABLE_LIGHTS);
+        // The light's own vertex, and one for each scattering.
+        let limit = (self.max_depth as usize).saturating_add(1);
+        for y in tile.min[1]..tile.max[1] {
+            for x in tile.min[0]..tile.max[0] {
+                let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
+                for i in tile.sample_begin..tile.sample_end {
+                    let mut draws = NetDraws::new(tile.seed, pixel, i, scene.lanes());
+                    if emits {
+                        paths
+                            .light
+                            .from_light::<CHROMATIC, _>(scene, &mut draws, limit)?;
+                    }
+                    for s in 1..=paths.light.len() {
+                        if let Some(splat) = paths.project(scene, s, &mut draws)? {
+                            out.splat(splat.film, splat.radiance)?;
+                        }
+                    }
+                    let mut sample = PixelSample::default();
+                    if scene.has(scene_traits::ENVIRONMENT) {
+                        sample.radiance =
+                            behind::<CHROMATIC>(scene, &mut paths, [x, y], &mut draws)?;
+                    }
+                    out.add(x, y, &sample)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Lights at infinity that the camera's ray arrives at without scattering.
+fn behind<const CHROMATIC: bool>(
+    scene: &SceneView<'_>,
+    paths: &mut Bidirectional,
+    pixel: [u32; 2],
+    draws: &mut NetDraws,
+) -> Outcome<Spectrum> {
+    let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
+    let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? else {
+        return Ok(Spectrum::ZERO);
+    };
+    paths
+        .sensor
+        .from_sensor::<CHROMATIC, _>(scene, &ray, draws, 2)?;
+    match paths.sensor.nodes().get(1) {
+        Some(node) if node.vertex.is_infinite() => paths.hit(scene, 2),
+        _ => Ok(Spectrum::ZERO),
+    }
+}
+
+resolvent_api::export_plugin!(integrator, ParticleTracer);
