@@ -15,6 +15,7 @@ pub mod extent;
 pub mod integrator;
 pub mod math;
 pub mod medium;
+pub mod microfacet;
 pub mod nested;
 pub mod operator;
 pub mod params;

@@ -13,6 +13,8 @@ const RINGS: usize = 140;
 const INNERMOST: f64 = 1e-6;
 /// Sectors of azimuth.
 pub const SECTORS: usize = 12;
+/// Panels of quadrature in each sector.
+const PANELS: usize = 3;
 /// Bands of polar angle in the histogram, of about equal probability.
 pub const BANDS: usize = 24;
 
@@ -62,8 +64,10 @@ impl Density {
             for (theta, dtheta) in gauss(ring[0], ring[1]) {
                 let (sin, cos) = theta.sin_cos();
                 for (j, mass) in mass.iter_mut().enumerate() {
-                    let step = 2.0 * PI / SECTORS as f64;
-                    for (phi, dphi) in gauss(j as f64 * step, (j + 1) as f64 * step) {
+                    let step = 2.0 * PI / (SECTORS * PANELS) as f64;
+                    let panels = (j * PANELS..(j + 1) * PANELS)
+                        .flat_map(|k| gauss(k as f64 * step, (k + 1) as f64 * step));
+                    for (phi, dphi) in panels {
                         let w = frame[0] * (sin * phi.cos())
                             + frame[1] * (sin * phi.sin())
                             + frame[2] * cos;

@@ -36,20 +36,54 @@ impl Measured {
 /// All checks of a closure with smooth lobes for one `wo`: sampling against the density (χ²), weights and densities of
 /// samples against `eval`, energy by quadrature and by sampling, mean cosine, reciprocity, both modes.
 pub fn check(suite: &mut Suite, name: &str, k: &impl Scatter, measured: Measured, wo: Vec3) {
-    let name = format!("{name}, wo = {wo}");
     // The peak, if there is one, lies around −wo for phase functions and is symmetric to z for BSDFs: the grid's poles are there.
     let axis = match measured {
         Measured::Phase => -wo,
         Measured::Bsdf => Vec3::Z,
     };
+    check_around(suite, name, k, measured, wo, axis, 2e-4);
+}
+
+/// As [`check`], with the poles of the grid of directions, where it is finest, at ±`axis`, and the albedo up to 1 + `gain`: what
+/// the closure's tables may be off by.
+pub fn check_around(
+    suite: &mut Suite,
+    name: &str,
+    k: &impl Scatter,
+    measured: Measured,
+    wo: Vec3,
+    axis: Vec3,
+    gain: f64,
+) {
+    let name = format!("{name}, wo = {wo}");
     let density = Density::new(k, measured, wo, axis, Mode::Radiance);
     suite.claim(density.total <= 1.0 + 2e-4, || {
         format!("{name}: density integrates to {}", density.total)
     });
     samples::histogram(suite, &name, k, &density);
-    samples::weights(suite, &name, k, &density);
+    samples::weights(suite, &name, k, &density, gain);
     pairs::symmetry(suite, &name, k, wo);
     pairs::modes(suite, &name, k, wo);
+}
+
+/// Mean weight of samples for `wo` per lane over `n` well spread draws: the albedo, also of delta lobes.
+pub fn albedo(k: &impl Scatter, wo: Vec3, n: u32) -> [f64; 4] {
+    let mut sum = [0.0; 4];
+    for i in 0..n {
+        // Roberts' sequence in three dimensions.
+        let at = |a: f64| (0.5 + a * f64::from(i)).fract() as f32;
+        let u = ScatterDraws {
+            lobe: at(0.819_172_513_396_164_4).min(1.0 - f32::EPSILON),
+            dir: [at(0.671_043_606_703_789_2), at(0.549_700_477_901_970_3)]
+                .map(|u| u.min(1.0 - f32::EPSILON)),
+        };
+        if let Some(s) = k.sample(wo, u, Mode::Importance) {
+            for (sum, w) in sum.iter_mut().zip(s.weight.0) {
+                *sum += f64::from(w) / f64::from(n);
+            }
+        }
+    }
+    sum
 }
 
 /// Directions over the whole sphere, the same in every run.

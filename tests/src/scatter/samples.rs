@@ -32,7 +32,7 @@ pub fn histogram(suite: &mut Suite, name: &str, k: &impl Scatter, density: &Dens
 }
 
 /// Every sample's weight and densities against `eval`; the mean weight and cosine against quadrature.
-pub fn weights(suite: &mut Suite, name: &str, k: &impl Scatter, density: &Density) {
+pub fn weights(suite: &mut Suite, name: &str, k: &impl Scatter, density: &Density, gain: f64) {
     let mut stream = Stream::new(0x3e19);
     let mut lanes = [Moments::default(); 4];
     let mut cosine = Moments::default();
@@ -85,7 +85,7 @@ pub fn weights(suite: &mut Suite, name: &str, k: &impl Scatter, density: &Densit
             density.albedo[i],
             1e-4,
         );
-        suite.claim(density.albedo[i] <= 1.0 + 2e-4, || {
+        suite.claim(density.albedo[i] <= 1.0 + gain, || {
             format!("{name}: makes energy, albedo {}", density.albedo[i])
         });
     }
