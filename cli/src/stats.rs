@@ -221,7 +221,7 @@ fn geometry(scene: &Scene) -> Value {
         "nodes": s.nodes,
         "depth": s.depth,
         "triangles": s.triangles,
-        "spheres": s.spheres,
+        "quadrics": s.quadrics,
         "degenerate_triangles": s.degenerate_triangles,
         "memory_bytes": s.bytes,
         "build_seconds": s.build_seconds,

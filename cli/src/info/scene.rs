@@ -114,6 +114,8 @@ fn geometry(g: &Geometry) -> &'static str {
     match g {
         Geometry::Sphere { .. } => "sphere",
         Geometry::Rectangle { .. } => "rectangle",
+        Geometry::Disk { .. } => "disk",
+        Geometry::Cylinder { .. } => "cylinder",
         Geometry::Mesh(_) => "mesh",
         Geometry::Ply { .. } => "ply",
     }

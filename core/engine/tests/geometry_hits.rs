@@ -4,7 +4,9 @@ mod geometry_common;
 
 use geometry_common::{Uniform, icosphere, rays_in_test};
 use glam::{DVec3, Vec3, vec3};
-use resolvent_engine::geometry::{Accel, Geometry, Hit, Quad, Ray, Shape, Sphere, TriangleMesh};
+use resolvent_engine::geometry::{
+    Accel, Cylinder, Disk, Geometry, Hit, Quad, Ray, Shape, Sphere, TriangleMesh,
+};
 
 fn soup(n: usize, size: f32, random: &mut Uniform) -> TriangleMesh {
     let mut mesh = TriangleMesh::default();
@@ -71,6 +73,43 @@ fn brute(geometry: &Geometry, ray: &Ray, margin: f64) -> (Option<(u32, u32, f64)
                     }
                 }
             }
+            Shape::Disk(s) => {
+                let n = s.normal.as_dvec3();
+                let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+                let t = n.dot(s.center.as_dvec3() - o) / n.dot(d);
+                let (from_centre, r) = (
+                    (o + d * t).distance(s.center.as_dvec3()),
+                    f64::from(s.radius),
+                );
+                doubtful |= (from_centre - r).abs() < margin * r;
+                if from_centre <= r {
+                    consider(i, 0, t);
+                }
+            }
+            Shape::Cylinder(s) => {
+                // In a frame where the axis is z, the quadratic as it stands in books.
+                let z = s.axis.as_dvec3().normalize();
+                let x = z.any_orthonormal_vector();
+                let to = |v: DVec3| DVec3::new(x.dot(v), z.cross(x).dot(v), z.dot(v));
+                let (o, d) = (
+                    to(ray.o.as_dvec3() - s.base.as_dvec3()),
+                    to(ray.d.as_dvec3()),
+                );
+                let (r, l) = (f64::from(s.radius), s.axis.as_dvec3().length());
+                let a = d.x * d.x + d.y * d.y;
+                let b = o.x * d.x + o.y * d.y;
+                let h = b * b - a * (o.x * o.x + o.y * o.y - r * r);
+                doubtful |= h.abs() < margin * a * r * r;
+                if h >= 0.0 {
+                    for t in [(-b - h.sqrt()) / a, (-b + h.sqrt()) / a] {
+                        let at = o.z + t * d.z;
+                        doubtful |= at.abs().min((at - l).abs()) < margin * l;
+                        if (0.0..=l).contains(&at) {
+                            consider(i, 0, t);
+                        }
+                    }
+                }
+            }
             Shape::Sphere(s) => {
                 let (f, d, r) = (
                     ray.o.as_dvec3() - s.center.as_dvec3(),
@@ -106,6 +145,16 @@ fn mixed(random: &mut Uniform) -> Geometry {
             corner: random.vector(),
             edge_u: random.vector() * 0.3,
             edge_v: random.vector() * 0.3,
+        }));
+        shapes.push(Shape::Disk(Disk {
+            center: random.vector(),
+            normal: random.direction(),
+            radius: 0.05 + 0.15 * random.next(),
+        }));
+        shapes.push(Shape::Cylinder(Cylinder {
+            base: random.vector(),
+            axis: random.vector() * 0.4,
+            radius: 0.02 + 0.1 * random.next(),
         }));
     }
     Geometry { shapes }

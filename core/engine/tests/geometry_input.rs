@@ -133,7 +133,7 @@ fn degenerate_triangles_are_counted_and_harmless() {
             stats.bvhs,
             stats.degenerate_triangles,
             stats.triangles,
-            stats.spheres
+            stats.quadrics
         ),
         (1, 100, n as usize, 0)
     );
@@ -200,7 +200,7 @@ fn unusual_scenes() {
         let (target, size) = match shape {
             Shape::Quad(q) => (q.corner + (q.edge_u * 0.3 + q.edge_v * 0.6), q.edge_u.x),
             Shape::Sphere(s) => (s.center, s.radius),
-            Shape::Mesh(_) => unreachable!(),
+            other => unreachable!("{other:?}"),
         };
         // Straight down: quads above are larger and hide the smaller ones, so start just above.
         let ray = Ray::new(target + Vec3::Z * size * 0.5, -Vec3::Z);

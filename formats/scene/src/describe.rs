@@ -342,6 +342,8 @@ pub struct Shape {
     pub material: Option<String>,
     /// Radiance emitted from the outer side, W·sr⁻¹·m⁻², ≥ 0.
     pub emission: Option<Vec3>,
+    /// Emits from both sides; of no meaning without emission.
+    pub two_sided: bool,
     /// Name in [`Scene::media`] of what fills it; for closed shapes only.
     pub interior: Option<String>,
     /// Where closed shapes overlap that refract or have an interior, those of the highest priority fill the overlap, and the
@@ -379,6 +381,24 @@ pub enum Geometry {
         edge_u: Vec3,
         /// From the corner to the other neighbouring one.
         edge_v: Vec3,
+    },
+    /// A flat disk.
+    Disk {
+        /// Its centre.
+        center: Vec3,
+        /// Its normal; need not be of length 1, but not zero.
+        normal: Vec3,
+        /// Its radius, > 0.
+        radius: f64,
+    },
+    /// The lateral surface of a cylinder, without caps; its outer side faces away from the axis.
+    Cylinder {
+        /// Middle of one end.
+        base: Vec3,
+        /// From there to the middle of the other end; not zero.
+        axis: Vec3,
+        /// Its radius, > 0.
+        radius: f64,
     },
     /// Triangles in the scene file, counter-clockwise seen from outside.
     Mesh(Mesh),

@@ -248,7 +248,9 @@ pub(crate) static SCENE: Object = Object {
     rules: &[],
 };
 
-const SHAPES: Kind = Kind::List(&Kind::Variants(&[&SPHERE, &RECTANGLE, &MESH, &PLY]));
+const SHAPES: Kind = Kind::List(&Kind::Variants(&[
+    &SPHERE, &RECTANGLE, &DISK, &CYLINDER, &MESH, &PLY,
+]));
 
 static INSTANCE: Object = Object {
     name: "instance",
@@ -513,7 +515,12 @@ const EMISSION: Field = may(
     Kind::Spectrum,
     "Radiance emitted from the outer side: one number or RGB",
 );
-const INTERIOR: Field = may("interior", Kind::Name, "Name of the medium that fills it");
+const TWO_SIDED: Field = may("two_sided", Kind::Bool, "Emits from both sides (false)");
+const INTERIOR: Field = may(
+    "interior",
+    Kind::Name,
+    "Name of the medium on its inner side",
+);
 const PRIORITY: Field = may(
     "priority",
     Kind::Signed(-1_000_000, 1_000_000),
@@ -529,10 +536,14 @@ static SPHERE: Object = Object {
         need("radius", Kind::Number(Range::above(0.0, FAR)), "Its radius"),
         MATERIAL_NAME,
         EMISSION,
+        TWO_SIDED,
         INTERIOR,
         PRIORITY,
     ],
-    rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
+    rules: &[
+        Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("two_sided", "emission"),
+    ],
 };
 
 static RECTANGLE: Object = Object {
@@ -552,9 +563,55 @@ static RECTANGLE: Object = Object {
         ),
         MATERIAL_NAME,
         EMISSION,
+        TWO_SIDED,
         PRIORITY,
     ],
-    rules: &[Rule::AtLeastOne(&["material", "emission"])],
+    rules: &[
+        Rule::AtLeastOne(&["material", "emission"]),
+        Rule::Needs("two_sided", "emission"),
+    ],
+};
+
+static DISK: Object = Object {
+    name: "disk",
+    help: "A flat disk",
+    fields: &[
+        need("center", Kind::Vec3, "Its centre"),
+        need("normal", Kind::Vec3, "Its normal, of any length"),
+        need("radius", Kind::Number(Range::above(0.0, FAR)), "Its radius"),
+        MATERIAL_NAME,
+        EMISSION,
+        TWO_SIDED,
+        INTERIOR,
+        PRIORITY,
+    ],
+    rules: &[
+        Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("two_sided", "emission"),
+    ],
+};
+
+static CYLINDER: Object = Object {
+    name: "cylinder",
+    help: "The lateral surface of a cylinder, without caps",
+    fields: &[
+        need("base", Kind::Vec3, "Middle of one end"),
+        need(
+            "axis",
+            Kind::Vec3,
+            "From there to the middle of the other end",
+        ),
+        need("radius", Kind::Number(Range::above(0.0, FAR)), "Its radius"),
+        MATERIAL_NAME,
+        EMISSION,
+        TWO_SIDED,
+        INTERIOR,
+        PRIORITY,
+    ],
+    rules: &[
+        Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("two_sided", "emission"),
+    ],
 };
 
 static MESH: Object = Object {
@@ -572,10 +629,14 @@ static MESH: Object = Object {
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,
+        TWO_SIDED,
         INTERIOR,
         PRIORITY,
     ],
-    rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
+    rules: &[
+        Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("two_sided", "emission"),
+    ],
 };
 
 static PLY: Object = Object {
@@ -590,10 +651,14 @@ static PLY: Object = Object {
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,
+        TWO_SIDED,
         INTERIOR,
         PRIORITY,
     ],
-    rules: &[Rule::AtLeastOne(&["material", "emission", "interior"])],
+    rules: &[
+        Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("two_sided", "emission"),
+    ],
 };
 
 /// The range of every coordinate.

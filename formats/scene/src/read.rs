@@ -303,13 +303,7 @@ impl Reader<'_> {
                 }
             }),
             "distant" => {
-                let to_light = vec3(node, "to_light")?;
-                if length(to_light) == 0.0 {
-                    self.checker.report(
-                        node.get("to_light")?,
-                        "expected a direction that is not zero, found [0, 0, 0]",
-                    );
-                }
+                let to_light = self.direction(node, "to_light")?;
                 let angle_deg = number(node, "angle_deg").unwrap_or(0.0);
                 Light::Distant {
                     to_light,
@@ -323,19 +317,12 @@ impl Reader<'_> {
             },
             "rectangle" => {
                 let [corner, edge_u, edge_v] = self.rectangle(node)?;
-                let two_sided = matches!(
-                    node.get("two_sided"),
-                    Some(Node {
-                        data: Data::Bool(true),
-                        ..
-                    })
-                );
                 Light::Rectangle {
                     corner,
                     edge_u,
                     edge_v,
                     radiance: spectrum(node, "radiance")?,
-                    two_sided,
+                    two_sided: flag(node, "two_sided").unwrap_or(false),
                 }
             }
             _ => return None,
@@ -350,6 +337,18 @@ impl Reader<'_> {
             self.checker.report(node, what);
         }
         Some([vec3(node, "corner")?, edge_u, edge_v])
+    }
+
+    /// A vector that must not be zero.
+    fn direction(&mut self, node: &Node, key: &str) -> Option<Vec3> {
+        let v = vec3(node, key)?;
+        if length(v) == 0.0 {
+            self.checker.report(
+                node.get(key)?,
+                "expected a direction that is not zero, found [0, 0, 0]",
+            );
+        }
+        Some(v)
     }
 
     fn medium(&mut self, node: &Node) -> Option<Medium> {
@@ -377,6 +376,16 @@ impl Reader<'_> {
                     edge_v,
                 }
             }
+            "disk" => Geometry::Disk {
+                center: vec3(node, "center")?,
+                normal: self.direction(node, "normal")?,
+                radius: number(node, "radius")?,
+            },
+            "cylinder" => Geometry::Cylinder {
+                base: vec3(node, "base")?,
+                axis: self.direction(node, "axis")?,
+                radius: number(node, "radius")?,
+            },
             "mesh" => Geometry::Mesh(self.mesh(node)?),
             "ply" => Geometry::Ply {
                 file: text(node, "file")?.into(),
@@ -388,6 +397,7 @@ impl Reader<'_> {
             geometry,
             material: text(node, "material").map(String::from),
             emission: spectrum(node, "emission"),
+            two_sided: flag(node, "two_sided").unwrap_or(false),
             interior: text(node, "interior").map(String::from),
             priority: match node.get("priority") {
                 Some(n) => self.checker.doc.integer(n)?.try_into().ok()?,
@@ -550,6 +560,13 @@ fn items(node: &Node) -> &[Node] {
 fn number(node: &Node, key: &str) -> Option<f64> {
     match node.get(key)?.data {
         Data::Number(x) => Some(x),
+        _ => None,
+    }
+}
+
+fn flag(node: &Node, key: &str) -> Option<bool> {
+    match node.get(key)?.data {
+        Data::Bool(b) => Some(b),
         _ => None,
     }
 }

@@ -302,6 +302,16 @@ fn shape(s: &Shape) -> Json {
         } => {
             json!({"type": "rectangle", "corner": corner, "edge_u": edge_u, "edge_v": edge_v})
         }
+        Geometry::Disk {
+            center,
+            normal,
+            radius,
+        } => {
+            json!({"type": "disk", "center": center, "normal": normal, "radius": radius})
+        }
+        Geometry::Cylinder { base, axis, radius } => {
+            json!({"type": "cylinder", "base": base, "axis": axis, "radius": radius})
+        }
         Geometry::Mesh(m) => {
             let mut out = json!({"type": "mesh", "positions": m.positions, "indices": m.indices});
             if !m.normals.is_empty() {
@@ -324,6 +334,9 @@ fn shape(s: &Shape) -> Json {
     }
     if let Some(emission) = s.emission {
         out["emission"] = spectrum(emission);
+        if s.two_sided {
+            out["two_sided"] = json!(true);
+        }
     }
     if let Some(interior) = &s.interior {
         out["interior"] = json!(interior);

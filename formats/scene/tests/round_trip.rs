@@ -112,9 +112,27 @@ fn every_key_arrives() {
         ["cloud"]
     );
 
-    assert_eq!(s.shapes.len(), 4);
+    assert_eq!(s.shapes.len(), 6);
     assert_eq!(s.shapes[0].interior.as_deref(), Some("fog"));
     assert_eq!(s.shapes[1].emission, Some([0.1, 0.0, 0.0]));
+    let sides: Vec<bool> = s.shapes.iter().map(|s| s.two_sided).collect();
+    assert_eq!(sides, [false, false, false, false, true, false]);
+    assert_eq!(
+        s.shapes[4].geometry,
+        Geometry::Disk {
+            center: [0.0, 4.0, 0.0],
+            normal: [0.0, -2.0, 0.0],
+            radius: 0.5
+        }
+    );
+    assert_eq!(
+        s.shapes[5].geometry,
+        Geometry::Cylinder {
+            base: [1.0, 0.0, 0.0],
+            axis: [0.0, 2.0, 0.0],
+            radius: 0.25
+        }
+    );
     let Geometry::Mesh(mesh) = &s.shapes[2].geometry else {
         panic!()
     };
@@ -260,6 +278,7 @@ fn large_meshes_are_written_line_by_line() {
         geometry: Geometry::Mesh(mesh),
         material: None,
         emission: Some([1.0; 3]),
+        two_sided: false,
         interior: None,
         priority: 0,
     };

@@ -93,6 +93,10 @@ fn edits() -> Vec<(&'static str, Value)> {
         ("/instances/0/prototype", json!("")),
         ("/instances/1/transform", json!([{"scael": 1}])),
         ("/instances/1/interior", json!("fog")),
+        ("/shapes/3/two_sided", json!(true)),
+        ("/shapes/4/radius", json!(-1)),
+        ("/shapes/4/two_sided", json!(1)),
+        ("/shapes/5/axis", json!([0, 1])),
         ("/nothing", json!(7)),
     ]
 }

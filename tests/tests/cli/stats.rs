@@ -146,7 +146,7 @@ fn figures_are_complete_and_plausible() {
     assert_eq!(s["sampling"]["sample_range"], json!([0, 32]));
     assert_eq!(number(&s, "/sampling/samples"), 24.0 * 16.0 * 32.0);
     assert_eq!(s["image"]["resolution"], json!([24, 16]));
-    assert_eq!(number(&s, "/geometry/spheres"), 3.0);
+    assert_eq!(number(&s, "/geometry/quadrics"), 3.0);
     let names: Vec<_> = s["plugins"].as_array().into_iter().flatten().collect();
     for (kind, name) in [
         ("medium", "homogeneous"),

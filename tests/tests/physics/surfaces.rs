@@ -120,8 +120,8 @@ fn closed_surfaces() {
     run("closed_surfaces", &cases);
 }
 
-/// Irradiance on a plane from rectangles, spheres (partly below the horizon too), suns, points and the sky, as the radiance
-/// of a receiver of albedo 0.5. Disks at finite distances are left out: there are no such lights.
+/// Irradiance on a plane from rectangles, disks, spheres (partly below the horizon too), suns, points and the sky, as the
+/// radiance of a receiver of albedo 0.5.
 #[test]
 fn irradiance() {
     let mut cases = Vec::new();
@@ -170,6 +170,14 @@ fn irradiance() {
                         "emission": radiance
                     }),
                 );
+            }
+            "disk" => {
+                let at = [number(e, "lateral_offset"), 0.0, number(e, "height")];
+                let disk = json!({
+                    "type": "disk", "center": at, "normal": [0, 0, -1], "radius": e["radius"],
+                    "emission": radiance
+                });
+                scenes::add(&mut scene, "shapes", disk);
             }
             "dome" => match list(e, "L_coefficients_in_cos").len() {
                 1 => scenes::add(&mut scene, "lights", scenes::dome(1)),

@@ -9,10 +9,10 @@ use super::bvh8::Node8;
 use super::input::{Geometry, GeometryError};
 use super::instance::{Instance, Place};
 use super::portable::Portable;
+use super::quadric::Quadric;
 use super::ray::{Hit, Ray, RaySetup};
 #[cfg(target_arch = "x86_64")]
 use super::simd::Avx2;
-use super::sphere::Ball;
 use super::surface::{SurfacePoint, offset_origin};
 use super::traverse::{self, Candidate, Start, Tree};
 use super::triangle::Packet;
@@ -44,12 +44,12 @@ pub struct AccelStats {
     pub depth: usize,
     /// Triangles that can be hit, those of quads included; those of prototypes once.
     pub triangles: usize,
-    /// Spheres.
-    pub spheres: usize,
+    /// Spheres, disks and cylinders.
+    pub quadrics: usize,
     /// Triangles left out because two of their vertices are equal. (Three different vertices on a line stay: a gap between
     /// their neighbours may need them.)
     pub degenerate_triangles: usize,
-    /// Memory of nodes, triangle packets and spheres (without the geometry itself).
+    /// Memory of nodes, triangle packets and quadrics (without the geometry itself).
     pub bytes: usize,
     /// Wall-clock time of the build.
     pub build_seconds: f64,
@@ -114,10 +114,10 @@ impl Accel {
             stats.nodes += tree.nodes.len();
             stats.depth = stats.depth.max(tree.depth);
             stats.triangles += tree.packets.iter().map(Packet::count).sum::<usize>();
-            stats.spheres += tree.balls.len();
+            stats.quadrics += tree.quadrics.len();
             stats.bytes += size_of::<Node8>() * tree.nodes.len()
                 + size_of::<Packet>() * tree.packets.len()
-                + size_of::<Ball>() * tree.balls.len();
+                + size_of::<Quadric>() * tree.quadrics.len();
         }
         if let Some(i) = &instances {
             stats.instances = i.count();
@@ -214,7 +214,7 @@ impl Accel {
     }
 
     /// Nearest hit that `accept` takes. It is asked about hits in no particular order, about some more than once or needlessly.
-    /// A sphere whose nearer hit is refused is passed altogether: filters are meant to refuse primitives, not points.
+    /// A sphere or cylinder whose nearer hit is refused is passed altogether: filters are meant to refuse primitives, not points.
     #[inline]
     pub fn closest_with(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
         if self.instances.is_some() {
@@ -231,7 +231,7 @@ impl Accel {
     }
 
     /// Whether anything is hit that `opaque` says blocks the ray. It is asked in no particular order; see
-    /// [`Self::closest_with`] about spheres.
+    /// [`Self::closest_with`] about spheres and cylinders.
     #[inline]
     pub fn occluded_with(&self, ray: &Ray, mut opaque: impl FnMut(&Hit) -> bool) -> bool {
         self.any_candidate(ray, |c| opaque(&self.hit(c))) || self.occluded_by_instance(ray, opaque)

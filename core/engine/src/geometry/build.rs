@@ -12,7 +12,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use super::bvh8::{Bounds, Child, Node8};
 use super::collapse::{MAX_LEAF, Plan, Step};
 use super::input::Geometry;
-use super::sphere::{self, Ball};
+use super::quadric::Quadric;
 use super::traverse::{MAX_DEPTH, Tree};
 use super::triangle::{self, LANES, Packet};
 
@@ -33,14 +33,14 @@ pub(super) struct Primitive {
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Item {
     Triangle([[f32; 3]; 3]),
-    Ball(Ball),
+    Quadric(Quadric),
     /// Alone in its leaf.
     Instance,
 }
 
 impl Primitive {
-    pub fn is_ball(&self) -> bool {
-        matches!(self.item, Item::Ball(_))
+    pub fn is_quadric(&self) -> bool {
+        matches!(self.item, Item::Quadric(_))
     }
 }
 
@@ -50,16 +50,11 @@ pub(super) fn primitives(geometry: &Geometry) -> (Vec<Primitive>, usize) {
     let mut degenerate = 0;
     let mut number = 0;
     for shape in &geometry.shapes {
-        if let super::input::Shape::Sphere(s) = shape {
-            let item = Item::Ball(Ball {
-                center: s.center.to_array(),
-                radius: s.radius,
-                prim: number,
-            });
+        if let Some((quadric, bounds)) = Quadric::new(shape, number) {
             out.push(Primitive {
-                bounds: sphere::bounds(s),
+                bounds,
                 number,
-                item,
+                item: Item::Quadric(quadric),
             });
             number += 1;
             continue;
@@ -117,7 +112,7 @@ fn build_to(primitives: &[Primitive], cost_depth: usize) -> Option<Tree> {
     let binary = build_binary(primitives);
     let alone = matches!(primitives[0].item, Item::Instance);
     let most = if alone { 1 } else { MAX_LEAF };
-    let plan = Plan::new(&binary, most, |i| primitives[i as usize].is_ball());
+    let plan = Plan::new(&binary, most, |i| primitives[i as usize].is_quadric());
     let mut layout = Layout {
         primitives,
         binary: &binary,
@@ -127,7 +122,7 @@ fn build_to(primitives: &[Primitive], cost_depth: usize) -> Option<Tree> {
         tree: Tree {
             nodes: Vec::with_capacity(primitives.len() / 6 + 1),
             packets: Vec::with_capacity(primitives.len() / 3 + 1),
-            balls: Vec::new(),
+            quadrics: Vec::new(),
             depth: 0,
         },
     };
@@ -218,7 +213,8 @@ impl Layout<'_> {
     fn balanced(&mut self, prims: &[u32], depth: usize) -> (Child, Bounds) {
         let same_kind = |p: &[u32]| {
             p.iter().all(|&i| {
-                self.primitives[i as usize].is_ball() == self.primitives[p[0] as usize].is_ball()
+                self.primitives[i as usize].is_quadric()
+                    == self.primitives[p[0] as usize].is_quadric()
             })
         };
         let most = if self.alone { 1 } else { LANES };
@@ -240,13 +236,13 @@ impl Layout<'_> {
     /// Appends a leaf with `prims`, which are of one kind.
     fn leaf(&mut self, prims: &[u32]) -> (Child, Bounds) {
         let mut bounds = Bounds::EMPTY;
-        let (packets, balls) = (self.tree.packets.len(), self.tree.balls.len());
+        let (packets, quadrics) = (self.tree.packets.len(), self.tree.quadrics.len());
         for (i, &p) in prims.iter().enumerate() {
             let p = &self.primitives[p as usize];
             bounds.include(&p.bounds);
             match p.item {
                 Item::Instance => return (Child::leaf(true, p.number as usize, 1), p.bounds),
-                Item::Ball(ball) => self.tree.balls.push(ball),
+                Item::Quadric(quadric) => self.tree.quadrics.push(quadric),
                 Item::Triangle(vertices) => {
                     if i % LANES == 0 {
                         self.tree.packets.push(Packet::EMPTY);
@@ -257,8 +253,8 @@ impl Layout<'_> {
                 }
             }
         }
-        let child = if self.tree.balls.len() > balls {
-            Child::leaf(true, balls, self.tree.balls.len() - balls)
+        let child = if self.tree.quadrics.len() > quadrics {
+            Child::leaf(true, quadrics, self.tree.quadrics.len() - quadrics)
         } else {
             Child::leaf(false, packets, self.tree.packets.len() - packets)
         };

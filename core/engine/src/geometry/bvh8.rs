@@ -62,17 +62,17 @@ impl Node8 {
 }
 
 /// What a lane leads to, in 32 bits: an inner node (bit 31 clear, its index in the rest), or a leaf: bit 31 set, bit 30 set
-/// for spheres and clear for triangle packets, bits 27-29 the number of items less one, bits 0-26 the first item.
+/// for quadrics and clear for triangle packets, bits 27-29 the number of items less one, bits 0-26 the first item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub(super) struct Child(pub u32);
 
-/// Largest number of packets, spheres or primitives one hierarchy can hold (2²⁷).
+/// Largest number of packets, quadrics or primitives one hierarchy can hold (2²⁷).
 pub(super) const MAX_ITEMS: usize = 1 << 27;
 
 impl Child {
     const LEAF: u32 = 1 << 31;
-    const SPHERE: u32 = 1 << 30;
+    const QUADRIC: u32 = 1 << 30;
     const FIRST: u32 = (1 << 27) - 1;
     /// Most items in one leaf.
     pub const MAX_COUNT: usize = 8;
@@ -83,12 +83,12 @@ impl Child {
         Self(index as u32)
     }
 
-    pub fn leaf(spheres: bool, first: usize, count: usize) -> Self {
+    pub fn leaf(quadrics: bool, first: usize, count: usize) -> Self {
         assert!(
             first < MAX_ITEMS && (1..=Self::MAX_COUNT).contains(&count),
             "leaf out of range"
         );
-        let kind = if spheres { Self::SPHERE } else { 0 };
+        let kind = if quadrics { Self::QUADRIC } else { 0 };
         Self(Self::LEAF | kind | ((count - 1) as u32) << 27 | first as u32)
     }
 
@@ -98,8 +98,8 @@ impl Child {
     }
 
     #[inline(always)]
-    pub fn is_spheres(self) -> bool {
-        self.0 & Self::SPHERE != 0
+    pub fn is_quadrics(self) -> bool {
+        self.0 & Self::QUADRIC != 0
     }
 
     /// Items of a leaf.

@@ -16,7 +16,7 @@ const NODE_COST: f32 = 1.0;
 /// Cost of testing a packet of triangles. The ratio was found with `examples/rays.rs`: 0.3 beats 0.5, 1 and 2, since larger leaves
 /// also save memory traffic.
 const PACKET_COST: f32 = 0.3;
-/// Most primitives in one leaf: two packets of triangles, or as many spheres.
+/// Most primitives in one leaf: two packets of triangles, or as many quadrics.
 pub(super) const MAX_LEAF: u32 = 2 * LANES as u32;
 
 /// What becomes of a binary node: a leaf of the wide hierarchy, or a node of it.
@@ -34,7 +34,7 @@ struct Entry {
     left: [u8; 7],
     leaf: bool,
     triangles: u32,
-    balls: u32,
+    quadrics: u32,
 }
 
 /// Decisions for every binary node.
@@ -44,20 +44,20 @@ pub(super) struct Plan {
 
 impl Plan {
     /// `most`: how many primitives a leaf may have, at most [`MAX_LEAF`].
-    pub fn new(binary: &Bvh2, most: u32, is_ball: impl Fn(u32) -> bool) -> Self {
+    pub fn new(binary: &Bvh2, most: u32, is_quadric: impl Fn(u32) -> bool) -> Self {
         let mut entries = vec![Entry::default(); binary.nodes.len()];
         for &n in preorder(binary).iter().rev() {
             let node = &binary.nodes[n as usize];
             let area = node.aabb().half_area();
             entries[n as usize] = if node.is_leaf() {
                 // The builder makes leaves of one primitive.
-                let ball = is_ball(binary.primitive_indices[node.first_index as usize]);
+                let quadric = is_quadric(binary.primitive_indices[node.first_index as usize]);
                 Entry {
                     cost: [area * PACKET_COST; 7],
                     left: [0; 7],
                     leaf: true,
-                    triangles: u32::from(!ball),
-                    balls: u32::from(ball),
+                    triangles: u32::from(!quadric),
+                    quadrics: u32::from(quadric),
                 }
             } else {
                 let children = node.first_index as usize;
@@ -108,7 +108,7 @@ impl Plan {
     /// Primitives below binary node `n`.
     pub fn subtree(&self, binary: &Bvh2, n: u32) -> Vec<u32> {
         let e = &self.entries[n as usize];
-        let mut out = Vec::with_capacity((e.triangles + e.balls) as usize);
+        let mut out = Vec::with_capacity((e.triangles + e.quadrics) as usize);
         let mut todo = vec![n];
         while let Some(n) = todo.pop() {
             let node = &binary.nodes[n as usize];
@@ -141,7 +141,7 @@ fn preorder(binary: &Bvh2) -> Vec<u32> {
 fn combine(area: f32, most: u32, left: &Entry, right: &Entry) -> Entry {
     let mut e = Entry {
         triangles: left.triangles + right.triangles,
-        balls: left.balls + right.balls,
+        quadrics: left.quadrics + right.quadrics,
         ..Entry::default()
     };
     let split = |roots: usize| {
@@ -159,10 +159,10 @@ fn combine(area: f32, most: u32, left: &Entry, right: &Entry) -> Entry {
     let (below, k) = split(8);
     e.left[6] = k;
     e.cost[0] = area * NODE_COST + below;
-    let count = e.triangles + e.balls;
-    if count <= most && (e.triangles == 0 || e.balls == 0) {
-        let tests = if e.balls > 0 {
-            e.balls
+    let count = e.triangles + e.quadrics;
+    if count <= most && (e.triangles == 0 || e.quadrics == 0) {
+        let tests = if e.quadrics > 0 {
+            e.quadrics
         } else {
             e.triangles.div_ceil(LANES as u32)
         };

@@ -27,6 +27,28 @@ pub struct Sphere {
     pub radius: f32,
 }
 
+/// A flat disk; its geometric normal is `normal`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disk {
+    /// Centre, scene units.
+    pub center: Vec3,
+    /// Normal, of length 1 within rounding.
+    pub normal: Vec3,
+    /// Radius, scene units, greater than 0.
+    pub radius: f32,
+}
+
+/// The lateral surface of a cylinder, without caps; its geometric normal points away from the axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cylinder {
+    /// Middle of one end, scene units.
+    pub base: Vec3,
+    /// From there to the middle of the other end, not zero.
+    pub axis: Vec3,
+    /// Radius, scene units, greater than 0.
+    pub radius: f32,
+}
+
 /// A parallelogram corner + s·edge_u + t·edge_v with s, t in \[0, 1\]; its geometric normal is along edge_u × edge_v.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quad {
@@ -59,23 +81,27 @@ pub enum Shape {
     Sphere(Sphere),
     /// A parallelogram.
     Quad(Quad),
+    /// A flat disk.
+    Disk(Disk),
+    /// A cylinder without caps.
+    Cylinder(Cylinder),
 }
 
 impl Shape {
-    /// Number of primitives: triangles of a mesh, two halves of a quad, one sphere.
+    /// Number of primitives: triangles of a mesh, two halves of a quad, one of other shapes.
     pub fn primitives(&self) -> usize {
         match self {
             Self::Mesh(m) => m.indices.len(),
-            Self::Sphere(_) => 1,
+            Self::Sphere(_) | Self::Disk(_) | Self::Cylinder(_) => 1,
             Self::Quad(_) => 2,
         }
     }
 
-    /// Vertices of primitive `prim`; `None` for a sphere.
+    /// Vertices of primitive `prim`; `None` for shapes without triangles.
     pub(super) fn triangle(&self, prim: u32) -> Option<[Vec3; 3]> {
         match self {
             Self::Mesh(m) => Some(m.indices[prim as usize].map(|i| m.positions[i as usize])),
-            Self::Sphere(_) => None,
+            Self::Sphere(_) | Self::Disk(_) | Self::Cylinder(_) => None,
             Self::Quad(q) => Some(q.triangle(prim)),
         }
     }
@@ -151,6 +177,36 @@ pub enum GeometryError {
         /// Radius found.
         radius: f32,
     },
+    /// A disk has a bad centre, a radius that is not positive and finite, both together exceed the coordinate range, or its
+    /// normal is not of length 1.
+    #[error(
+        "shape {shape}: disk with centre {center}, normal {normal} and radius {radius}; all must be finite and within ±1e18, the radius positive, the normal of length 1"
+    )]
+    Disk {
+        /// Index of the shape.
+        shape: usize,
+        /// Centre found.
+        center: Vec3,
+        /// Normal found.
+        normal: Vec3,
+        /// Radius found.
+        radius: f32,
+    },
+    /// A cylinder has a bad end, an axis without length, a radius that is not positive and finite, or all together exceed the
+    /// coordinate range.
+    #[error(
+        "shape {shape}: cylinder from {base} along {axis} with radius {radius}; all must be finite and within ±1e18, radius and length positive"
+    )]
+    Cylinder {
+        /// Index of the shape.
+        shape: usize,
+        /// End found.
+        base: Vec3,
+        /// Axis found.
+        axis: Vec3,
+        /// Radius found.
+        radius: f32,
+    },
     /// A quad has a corner that is not finite or beyond [`MAX_COORDINATE`].
     #[error(
         "shape {shape}: corner {corner} of the quad is {value}; coordinates must be finite and within ±1e18"
@@ -193,6 +249,12 @@ fn in_range(p: Vec3) -> bool {
     p.abs().max_element() <= MAX_COORDINATE && p.is_finite()
 }
 
+/// True if everything within `radius` of `p` is in range.
+fn ball_in_range(p: Vec3, radius: f32) -> bool {
+    let reach = Vec3::splat(radius);
+    in_range(p) && in_range(p - reach) && in_range(p + reach)
+}
+
 impl Geometry {
     /// Number of primitives of all shapes.
     pub fn primitives(&self) -> usize {
@@ -216,15 +278,34 @@ impl Geometry {
             match shape {
                 Shape::Mesh(m) => check_mesh(i, m)?,
                 Shape::Sphere(s) => {
-                    let reach = Vec3::splat(s.radius);
-                    let fits = in_range(s.center)
-                        && in_range(s.center - reach)
-                        && in_range(s.center + reach);
-                    if !(fits && s.radius > 0.0) {
+                    if !(ball_in_range(s.center, s.radius) && s.radius > 0.0) {
                         return Err(GeometryError::Sphere {
                             shape: i,
                             center: s.center,
                             radius: s.radius,
+                        });
+                    }
+                }
+                Shape::Disk(d) => {
+                    let unit = (d.normal.length_squared() - 1.0).abs() < 1e-4;
+                    if !(ball_in_range(d.center, d.radius) && d.radius > 0.0 && unit) {
+                        return Err(GeometryError::Disk {
+                            shape: i,
+                            center: d.center,
+                            normal: d.normal,
+                            radius: d.radius,
+                        });
+                    }
+                }
+                Shape::Cylinder(c) => {
+                    let fits =
+                        ball_in_range(c.base, c.radius) && ball_in_range(c.base + c.axis, c.radius);
+                    if !(fits && c.radius > 0.0 && c.axis != Vec3::ZERO) {
+                        return Err(GeometryError::Cylinder {
+                            shape: i,
+                            base: c.base,
+                            axis: c.axis,
+                            radius: c.radius,
                         });
                     }
                 }

@@ -17,7 +17,7 @@
 //! # Ok::<(), resolvent_engine::geometry::GeometryError>(())
 //! ```
 //!
-//! - [`Geometry`] is a list of [`Shape`]s: triangle meshes, spheres, quads. [`Accel::build`] checks it (bad input is a
+//! - [`Geometry`] is a list of [`Shape`]s: triangle meshes, quads, spheres, disks, cylinders. [`Accel::build`] checks it (bad input is a
 //!   [`GeometryError`] that names shape and index; triangles with equal vertices are left out and counted) and builds one hierarchy;
 //!   a scene with nothing to hit gives `None`.
 //! - [`Accel::build_instanced`] adds copies of prototypes: every prototype has a hierarchy of its own, and one over the copies'
@@ -31,15 +31,18 @@
 //! - triangles are watertight, with f64 where f32 cannot decide, also about which side of a triangle a ray starts on;
 //! - equal distances go to the lower primitive, so that hits do not depend on the shape of the hierarchy or on the processor.
 //!
-//! `ray` → `traverse` (generic over `portable` and `simd` kernels) → `triangle`, `sphere`; `input` → `build` → `collapse`.
+//! `ray` → `traverse` (generic over `portable` and `simd` kernels) → `triangle`, `quadric`; `input` → `build` → `collapse`.
 
 mod accel;
 mod build;
 mod bvh8;
 mod collapse;
+mod cylinder;
+mod disk;
 mod input;
 mod instance;
 mod portable;
+mod quadric;
 mod ray;
 #[cfg(target_arch = "x86_64")]
 mod simd;
@@ -50,7 +53,7 @@ mod triangle;
 mod two_level;
 
 pub use accel::{Accel, AccelStats};
-pub use input::{Geometry, GeometryError, Quad, Shape, Sphere, TriangleMesh};
+pub use input::{Cylinder, Disk, Geometry, GeometryError, Quad, Shape, Sphere, TriangleMesh};
 pub use instance::Instance;
 pub use ray::{Hit, MAX_COORDINATE, Ray};
 pub use surface::{SurfacePoint, offset_origin};

@@ -63,11 +63,11 @@ pub struct Hit {
     pub t: f32,
     /// Index of the shape in [`super::Geometry::shapes`].
     pub shape: u32,
-    /// Primitive within the shape: the triangle of a mesh; 0 or 1 for a quad's halves; 0 for a sphere.
+    /// Primitive within the shape: the triangle of a mesh; 0 or 1 for a quad's halves; 0 for spheres, disks and cylinders.
     pub prim: u32,
-    /// Barycentric weight of the triangle's second vertex; 0 for spheres.
+    /// Barycentric weight of the triangle's second vertex; 0 for shapes without triangles.
     pub u: f32,
-    /// Barycentric weight of the triangle's third vertex; 0 for spheres.
+    /// Barycentric weight of the triangle's third vertex; 0 for shapes without triangles.
     pub v: f32,
 }
 

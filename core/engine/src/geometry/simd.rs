@@ -123,7 +123,7 @@ impl Kernel for Avx2 {
         // A node, or the two packets that most leaves have.
         let (start, lines): (*const i8, usize) = if !child.is_leaf() {
             (tree.nodes.as_ptr().wrapping_add(child.0 as usize).cast(), 4)
-        } else if !child.is_spheres() {
+        } else if !child.is_quadrics() {
             (
                 tree.packets
                     .as_ptr()

@@ -7,10 +7,8 @@ use super::ray::RaySetup;
 /// A sphere in the hierarchy.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
-    pub center: [f32; 3],
-    pub radius: f32,
-    /// Number among all primitives of the geometry.
-    pub prim: u32,
+    center: [f32; 3],
+    radius: f32,
 }
 
 /// Box of a sphere, rounded outwards.
@@ -25,6 +23,13 @@ pub(super) fn bounds(s: &Sphere) -> Bounds {
 }
 
 impl Ball {
+    pub fn new(s: &Sphere) -> Self {
+        Self {
+            center: s.center.to_array(),
+            radius: s.radius,
+        }
+    }
+
     /// Nearest t in (t_min, `t_max`\] on the sphere's surface, from outside or inside.
     ///
     /// In f64, with the discriminant from the distance between centre and ray instead of b² − ac (Hearn & Baker; Haines et al.,

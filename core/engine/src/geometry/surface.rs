@@ -4,7 +4,8 @@ use std::f32::consts::{PI, TAU};
 
 use glam::{DVec3, Vec2, Vec3};
 
-use super::input::{Geometry, Quad, Shape, Sphere, TriangleMesh};
+use super::cylinder::Tube;
+use super::input::{Cylinder, Disk, Geometry, Quad, Shape, Sphere, TriangleMesh};
 use super::ray::{Hit, Ray, RaySetup};
 use super::triangle;
 
@@ -15,13 +16,14 @@ pub struct SurfacePoint {
     pub p: Vec3,
     /// Bound on the distance of `p` from the surface along each axis.
     pub p_error: Vec3,
-    /// Geometric normal, unit: (v1 − v0) × (v2 − v0) for triangles, edge_u × edge_v for quads, outwards for spheres. It does
-    /// not depend on where the ray came from.
+    /// Geometric normal, unit: (v1 − v0) × (v2 − v0) for triangles, edge_u × edge_v for quads, outwards for spheres
+    /// and cylinders. It does not depend on where the ray came from.
     pub ng: Vec3,
     /// Shading normal, unit, on the same side as `ng` (ng·ns ≥ 0): interpolated if the mesh has normals, else `ng`.
     pub ns: Vec3,
     /// Texture coordinates: the mesh's; for meshes without any, the barycentric weights of the second and third vertex; (s, t)
-    /// of quads; (φ/2π, θ/π) of spheres with θ from +z.
+    /// of quads; (φ/2π, θ/π) of spheres with θ from +z; of disks ((x, y)/r + 1)/2, of cylinders (φ/2π, height/length), with x and φ = 0
+    /// along some vector that depends on the normal or axis alone.
     pub uv: Vec2,
     /// ∂p/∂u. Where the coordinates do not define it: some vector in the tangent plane of `ng`.
     pub dpdu: Vec3,
@@ -41,6 +43,8 @@ impl Geometry {
             Shape::Mesh(m) => mesh(m, hit, ray),
             Shape::Quad(q) => quad(q, hit, ray),
             Shape::Sphere(s) => sphere(s, hit, ray),
+            Shape::Disk(d) => disk(d, hit, ray),
+            Shape::Cylinder(c) => cylinder(c, hit, ray),
         }
     }
 }
@@ -160,6 +164,61 @@ fn sphere(s: &Sphere, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: ng,
         uv,
         dpdu,
+        shape: hit.shape,
+        prim: hit.prim,
+    }
+}
+
+fn disk(s: &Disk, hit: &Hit, ray: &Ray) -> SurfacePoint {
+    let center = s.center.as_dvec3();
+    let n = s.normal.as_dvec3().normalize_or_zero();
+    let local = ray.o.as_dvec3() + ray.d.as_dvec3() * f64::from(hit.t) - center;
+    // What the f32 t is off along the ray is taken back: into the plane, and not beyond the rim.
+    let local = (local - n * n.dot(local)).clamp_length_max(f64::from(s.radius));
+    let (p, p_error) = rounded(center + local);
+    let x = n.any_orthonormal_vector();
+    let r = f64::from(s.radius);
+    let uv = Vec2::new(
+        (x.dot(local) / r) as f32,
+        (n.cross(x).dot(local) / r) as f32,
+    );
+    SurfacePoint {
+        p,
+        p_error,
+        ng: s.normal,
+        ns: s.normal,
+        uv: (uv * 0.5 + 0.5).clamp(Vec2::ZERO, Vec2::ONE),
+        dpdu: x.as_vec3() * (2.0 * s.radius),
+        shape: hit.shape,
+        prim: hit.prim,
+    }
+}
+
+fn cylinder(c: &Cylinder, hit: &Hit, ray: &Ray) -> SurfacePoint {
+    let (base, axis) = (c.base.as_dvec3(), c.axis.as_dvec3());
+    let length = axis.length();
+    let axis = axis / length;
+    // An f32 distance to a thin cylinder far away may be off by more than its radius: find it again.
+    let t = Tube::new(c)
+        .solve(ray.o, ray.d, ray.t_min, ray.t_max)
+        .unwrap_or(f64::from(hit.t));
+    let local = ray.o.as_dvec3() + ray.d.as_dvec3() * t - base;
+    let height = axis.dot(local).clamp(0.0, length);
+    let x = axis.any_orthonormal_vector();
+    let n = (local - axis * axis.dot(local))
+        .try_normalize()
+        .unwrap_or(x);
+    let (p, p_error) = rounded(base + axis * height + n * f64::from(c.radius));
+    let phi = axis.cross(x).dot(n).atan2(x.dot(n)) as f32;
+    let phi = if phi < 0.0 { phi + TAU } else { phi };
+    let ng = n.as_vec3();
+    SurfacePoint {
+        p,
+        p_error,
+        ng,
+        ns: ng,
+        uv: Vec2::new(phi / TAU, (height / length) as f32),
+        dpdu: axis.cross(n).as_vec3() * (TAU * c.radius),
         shape: hit.shape,
         prim: hit.prim,
     }

@@ -2,8 +2,8 @@
 
 use super::bvh8::{Child, Node8};
 use super::portable::Kernel;
+use super::quadric::Quadric;
 use super::ray::RaySetup;
-use super::sphere::Ball;
 use super::triangle::{Packet, PacketHits};
 
 /// Deepest hierarchy the builder makes, counted in nodes on a path from the root.
@@ -15,12 +15,12 @@ pub(super) const DEEP_STACK: usize = 7 * MAX_DEPTH + 1;
 /// Enough for depth 9. Clearing the stack is a measurable part of a ray, hence two sizes.
 pub(super) const SHALLOW_STACK: usize = 64;
 
-/// What is traversed: nodes from the root (index 0), triangle packets, spheres.
+/// What is traversed: nodes from the root (index 0), triangle packets, quadrics.
 #[derive(Clone, Debug)]
 pub(super) struct Tree {
     pub nodes: Vec<Node8>,
     pub packets: Vec<Packet>,
-    pub balls: Vec<Ball>,
+    pub quadrics: Vec<Quadric>,
     /// Nodes on the longest path from the root.
     pub depth: usize,
 }
@@ -31,7 +31,7 @@ impl Tree {
         Self {
             nodes: vec![Node8::EMPTY],
             packets: Vec::new(),
-            balls: Vec::new(),
+            quadrics: Vec::new(),
             depth: 1,
         }
     }
@@ -171,13 +171,13 @@ where
             height -= 1;
             current = Child(stack[height] as u32);
         }
-        if current.is_spheres() {
-            for ball in &tree.balls[current.items()] {
-                if let Some(t) = ball.intersect(ray, best.t) {
+        if current.is_quadrics() {
+            for quadric in &tree.quadrics[current.items()] {
+                if let Some(t) = quadric.intersect(ray, best.t) {
                     consider(
                         Candidate {
                             t,
-                            prim: ball.prim,
+                            prim: quadric.prim,
                             u: 0.0,
                             v: 0.0,
                         },
@@ -258,12 +258,12 @@ where
                 }
                 continue;
             }
-        } else if current.is_spheres() {
-            for ball in &tree.balls[current.items()] {
-                if let Some(t) = ball.intersect(ray, t_max)
+        } else if current.is_quadrics() {
+            for quadric in &tree.quadrics[current.items()] {
+                if let Some(t) = quadric.intersect(ray, t_max)
                     && blocks(Candidate {
                         t,
-                        prim: ball.prim,
+                        prim: quadric.prim,
                         u: 0.0,
                         v: 0.0,
                     })

@@ -1,7 +1,7 @@
 //! Emitting shapes.
 
 use super::{Distribution, per_solid_angle};
-use crate::geometry::{Quad, Sphere, TriangleMesh};
+use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh};
 use resolvent_api::Spectrum;
 use resolvent_api::math::{Frame, Vec3, warp};
 use resolvent_api::vertex::{LightSample, NONE};
@@ -50,6 +50,10 @@ pub enum AreaShape {
     Quad(Quad),
     /// A sphere; directions are uniform in the cone it fills as seen from outside, points uniform in area from inside.
     Sphere(Sphere),
+    /// A disk, with a frame around its normal; points are uniform in area.
+    Disk(Disk, Frame),
+    /// The lateral surface of a cylinder, with a frame around its axis; points are uniform in area.
+    Cylinder(Cylinder, Frame),
     /// Triangles; points are uniform in area.
     Mesh(TriangleMesh, Distribution),
 }
@@ -73,20 +77,46 @@ impl Area {
     }
 
     /// An emitting sphere.
-    pub fn sphere(shape: u32, sphere: Sphere, radiance: Spectrum) -> Self {
+    pub fn sphere(shape: u32, sphere: Sphere, radiance: Spectrum, two_sided: bool) -> Self {
         let area = 4.0 * PI * sphere.radius * sphere.radius;
         Self {
             shape,
             radiance,
-            two_sided: false,
+            two_sided,
             form: AreaShape::Sphere(sphere),
             area,
             terms: Vec3::ZERO,
         }
     }
 
+    /// An emitting disk.
+    pub fn disk(shape: u32, disk: Disk, radiance: Spectrum, two_sided: bool) -> Self {
+        Self {
+            shape,
+            radiance,
+            two_sided,
+            form: AreaShape::Disk(disk, Frame::around(disk.normal)),
+            area: PI * disk.radius * disk.radius,
+            terms: Vec3::ZERO,
+        }
+    }
+
+    /// An emitting cylinder.
+    pub fn cylinder(shape: u32, cylinder: Cylinder, radiance: Spectrum, two_sided: bool) -> Self {
+        let axis = cylinder.axis.as_dvec3();
+        let length = axis.length();
+        Self {
+            shape,
+            radiance,
+            two_sided,
+            form: AreaShape::Cylinder(cylinder, Frame::around((axis / length).as_vec3())),
+            area: (2.0 * std::f64::consts::PI * f64::from(cylinder.radius) * length) as f32,
+            terms: Vec3::ZERO,
+        }
+    }
+
     /// Emitting triangles; those without area are never chosen.
-    pub fn mesh(shape: u32, mesh: TriangleMesh, radiance: Spectrum) -> Self {
+    pub fn mesh(shape: u32, mesh: TriangleMesh, radiance: Spectrum, two_sided: bool) -> Self {
         let areas: Vec<f64> = mesh
             .indices
             .iter()
@@ -100,7 +130,7 @@ impl Area {
         Self {
             shape,
             radiance,
-            two_sided: false,
+            two_sided,
             form: AreaShape::Mesh(mesh, distribution),
             area,
             terms: Vec3::ZERO,
@@ -155,6 +185,19 @@ impl Area {
                 let n = warp::sphere(u);
                 let size = s.center.abs() + Vec3::splat(s.radius);
                 (s.center + n * s.radius, size, n, 0)
+            }
+            AreaShape::Disk(d, frame) => {
+                let [x, y] = warp::disk(u);
+                let p = d.center + frame.to_world(Vec3::new(x, y, 0.0)) * d.radius;
+                let size = d.center.abs() + Vec3::splat(d.radius);
+                (p, size, d.normal, 0)
+            }
+            AreaShape::Cylinder(c, frame) => {
+                let (sin, cos) = (2.0 * PI * u[0]).sin_cos();
+                let n = frame.to_world(Vec3::new(cos, sin, 0.0));
+                let p = c.base + c.axis * u[1] + n * c.radius;
+                let size = c.base.abs() + c.axis.abs() + Vec3::splat(c.radius);
+                (p, size, n, 0)
             }
         };
         let size = size + self.terms;
@@ -245,7 +288,7 @@ mod tests {
             center: from + Vec3::new(0.0, 0.0, 3.0),
             radius: 1.0,
         };
-        let area = Area::sphere(0, sphere, Spectrum::ONE);
+        let area = Area::sphere(0, sphere, Spectrum::ONE, false);
         let accel = Accel::build(Geometry {
             shapes: vec![Shape::Sphere(sphere)],
         })

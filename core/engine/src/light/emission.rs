@@ -191,7 +191,7 @@ mod tests {
         let to_light = Vec3::new(0.3, 0.5, 0.8).normalize();
         let all = vec![
             Light::Area(Area::quad(0, quad, Spectrum::splat(2.0), true)),
-            Light::Area(Area::sphere(1, sphere, Spectrum::splat(1.0))),
+            Light::Area(Area::sphere(1, sphere, Spectrum::splat(1.0), false)),
             Light::Point {
                 position: Vec3::new(0.0, 0.7, 0.0),
                 intensity: Spectrum::splat(0.5),

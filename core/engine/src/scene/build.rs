@@ -150,7 +150,8 @@ impl Scene {
             let shape = wide.narrow(centre);
             let mut surface = behind(described, None)?;
             if let Some(e) = described.emission.filter(|_| emits(described)) {
-                lights.push(Light::Area(area(&shape, shapes.len() as u32, spectrum(e))));
+                let (index, sides) = (shapes.len() as u32, described.two_sided);
+                lights.push(Light::Area(area(&shape, index, spectrum(e), sides)));
                 surface.light = Some(lights.len() as u32 - 1);
                 surface.null = false;
             }
@@ -203,7 +204,8 @@ impl Scene {
             Some(accel) if accel.stats().instances > 0 => {
                 groups.surfaces(accel, &placed, &mut behind, |described, shape, at, size| {
                     let radiance = spectrum(described.emission.unwrap_or_default());
-                    lights.push(Light::Area(area(shape, at, radiance).made_of(size)));
+                    let emitter = area(shape, at, radiance, described.two_sided);
+                    lights.push(Light::Area(emitter.made_of(size)));
                     lights.len() as u32 - 1
                 })?
             }
@@ -368,11 +370,13 @@ fn centre(scene: &describe::Scene, shapes: &[Wide], groups: &Groups, camera: DVe
     }
 }
 
-fn area(shape: &Shape, index: u32, radiance: Spectrum) -> Area {
+fn area(shape: &Shape, index: u32, radiance: Spectrum, two_sided: bool) -> Area {
     match shape {
-        Shape::Quad(q) => Area::quad(index, *q, radiance, false),
-        Shape::Sphere(s) => Area::sphere(index, *s, radiance),
-        Shape::Mesh(m) => Area::mesh(index, m.clone(), radiance),
+        Shape::Quad(q) => Area::quad(index, *q, radiance, two_sided),
+        Shape::Sphere(s) => Area::sphere(index, *s, radiance, two_sided),
+        Shape::Disk(d) => Area::disk(index, *d, radiance, two_sided),
+        Shape::Cylinder(c) => Area::cylinder(index, *c, radiance, two_sided),
+        Shape::Mesh(m) => Area::mesh(index, m.clone(), radiance, two_sided),
     }
 }
 
@@ -382,6 +386,16 @@ fn shapes_bounds(geometry: &Geometry, mut bounds: Aabb) -> Aabb {
             Shape::Sphere(s) => {
                 let r = Vec3::splat(s.radius);
                 bounds = bounds.including(s.center - r).including(s.center + r);
+            }
+            Shape::Disk(d) => {
+                let r = Vec3::splat(d.radius);
+                bounds = bounds.including(d.center - r).including(d.center + r);
+            }
+            Shape::Cylinder(c) => {
+                let r = Vec3::splat(c.radius);
+                for p in [c.base, c.base + c.axis] {
+                    bounds = bounds.including(p - r).including(p + r);
+                }
             }
             Shape::Quad(q) => {
                 for (a, b) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {

@@ -3,7 +3,7 @@
 use super::Surface;
 use super::shapes::{Wide, affine};
 use crate::error::{Error, Result};
-use crate::geometry::{Accel, Geometry, Instance, Quad, Shape, Sphere};
+use crate::geometry::{Accel, Cylinder, Disk, Geometry, Instance, Quad, Shape, Sphere};
 use glam::DVec3;
 use resolvent_api::{Affine, Vec3};
 use resolvent_scene as describe;
@@ -262,6 +262,21 @@ fn transformed(shape: &Shape, t: &Affine) -> Option<Shape> {
         Shape::Sphere(s) => Shape::Sphere(Sphere {
             center: point(s.center),
             radius: s.radius * similarity(t)? as f32,
+        }),
+        Shape::Disk(d) => {
+            let scale = similarity(t)?;
+            Shape::Disk(Disk {
+                center: point(d.center),
+                normal: (t.vector(d.normal.as_dvec3()) / scale)
+                    .normalize()
+                    .as_vec3(),
+                radius: d.radius * scale as f32,
+            })
+        }
+        Shape::Cylinder(c) => Shape::Cylinder(Cylinder {
+            base: point(c.base),
+            axis: vector(c.axis),
+            radius: c.radius * similarity(t)? as f32,
         }),
     })
 }

@@ -1,7 +1,7 @@
 //! From described shapes to geometry, relative to the scene's centre.
 
 use crate::error::{Error, Result};
-use crate::geometry::{Quad, Shape, Sphere, TriangleMesh};
+use crate::geometry::{Cylinder, Disk, Quad, Shape, Sphere, TriangleMesh};
 use glam::{DVec3, Vec2, Vec3};
 use resolvent_api::Affine;
 use resolvent_scene::{Geometry, Scene, Transform};
@@ -17,6 +17,10 @@ pub(super) fn affine(t: &Transform) -> Affine {
 pub(super) enum Wide {
     Sphere(DVec3, f64),
     Quad([DVec3; 3]),
+    /// Centre, unit normal, radius.
+    Disk(DVec3, DVec3, f64),
+    /// One end, axis, radius.
+    Cylinder(DVec3, DVec3, f64),
     Mesh {
         positions: Vec<DVec3>,
         normals: Vec<Vec3>,
@@ -34,6 +38,19 @@ impl Wide {
                 edge_u,
                 edge_v,
             } => Self::Quad([*corner, *edge_u, *edge_v].map(DVec3::from)),
+            Geometry::Disk {
+                center,
+                normal,
+                radius,
+            } => Self::Disk(
+                DVec3::from(*center),
+                // Scaled first: the squares of large components would be infinite.
+                (DVec3::from(*normal) / DVec3::from(*normal).abs().max_element()).normalize(),
+                *radius,
+            ),
+            Geometry::Cylinder { base, axis, radius } => {
+                Self::Cylinder(DVec3::from(*base), DVec3::from(*axis), *radius)
+            }
             Geometry::Mesh(m) => Self::mesh(
                 &affine(&m.transform),
                 m.positions.iter().map(|p| DVec3::from(*p)),
@@ -108,6 +125,11 @@ impl Wide {
         match self {
             Self::Sphere(c, r) => around(&mut [*c - *r, *c + *r].into_iter()),
             Self::Quad([o, u, v]) => around(&mut [*o, *o + *u, *o + *v, *o + *u + *v].into_iter()),
+            // Boxes around the circles' spheres: for the scene's centre they need not be tight.
+            Self::Disk(c, _, r) => around(&mut [*c - *r, *c + *r].into_iter()),
+            Self::Cylinder(b, a, r) => {
+                around(&mut [*b - *r, *b + *r, *b + *a - *r, *b + *a + *r].into_iter())
+            }
             Self::Mesh { positions, .. } => around(&mut positions.iter().copied()),
         }
     }
@@ -123,6 +145,16 @@ impl Wide {
                 corner: (o - centre).as_vec3(),
                 edge_u: u.as_vec3(),
                 edge_v: v.as_vec3(),
+            }),
+            Self::Disk(c, n, r) => Shape::Disk(Disk {
+                center: (c - centre).as_vec3(),
+                normal: n.as_vec3(),
+                radius: r as f32,
+            }),
+            Self::Cylinder(b, a, r) => Shape::Cylinder(Cylinder {
+                base: (b - centre).as_vec3(),
+                axis: a.as_vec3(),
+                radius: r as f32,
             }),
             Self::Mesh {
                 positions,

@@ -49,7 +49,9 @@ pub const FULL: &str = r#"{
      "normals": [[0, 0, 1], [0, 0, 1], [0, 0, 1]], "uvs": [[0, 0], [1, 0], [0, 1]],
      "transform": [{"scale": 2}, {"rotate_deg": {"axis": [1, 1, 0], "angle": 90}}, {"translate": [0, 0, 5]}],
      "material": "with a blank"},
-    {"type": "ply", "file": "bunny.ply", "material": "floor", "interior": "fog", "priority": -2}
+    {"type": "ply", "file": "bunny.ply", "material": "floor", "interior": "fog", "priority": -2},
+    {"type": "disk", "center": [0, 4, 0], "normal": [0, -2, 0], "radius": 0.5, "emission": 3, "two_sided": true},
+    {"type": "cylinder", "base": [1, 0, 0], "axis": [0, 2, 0], "radius": 0.25, "material": "floor", "interior": "fog"}
   ],
   "prototypes": {
     "stone": [
