@@ -157,7 +157,7 @@ fn every_key_arrives() {
         }
     );
     let priorities: Vec<i32> = s.all_shapes().map(|s| s.priority).collect();
-    assert_eq!(priorities, [0, 0, 0, -2, 0, 3]);
+    assert_eq!(priorities, [0, 0, 0, -2, 0, 0, 0, 3]);
     assert_eq!(s.prototypes["stone"].len(), 2);
     assert_eq!(
         s.instances[0],
