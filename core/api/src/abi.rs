@@ -561,8 +561,9 @@ pub struct Tile {
     pub window: [u32; 4],
     /// 1 if features are wanted.
     pub features: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// How far beyond the window's border light still counts for its pixels: the reach of the reconstruction filter past
+    /// half a pixel.
+    pub margin: f32,
 }
 
 /// Where an integrator puts its samples.

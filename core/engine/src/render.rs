@@ -137,7 +137,7 @@ pub fn render(
                 resolution: settings.resolution,
                 window: settings.window,
                 features: u32::from(settings.features),
-                reserved: 0,
+                margin: (scene.camera.filter().radius() - 0.5).max(0.0),
             };
             if let Err(why) = piece(scene, integrator, &tile, &work) {
                 broken.store(true, Ordering::Relaxed);

@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bidirectional;
+pub mod chain;
 pub mod features;
 pub mod measure;
 pub mod mis;

@@ -55,6 +55,11 @@ pub struct Subpath {
     len: usize,
     /// Radiance that media emit along the walk (walks from the sensor).
     pub emitted: Spectrum,
+    /// The part of it that the last edge gave, and how many edges there were: one more than vertices to arrive at if the
+    /// light was lost.
+    pub last_emitted: Spectrum,
+    /// Edges walked.
+    pub edges: usize,
 }
 
 impl Subpath {
@@ -83,6 +88,8 @@ impl Subpath {
     pub fn clear(&mut self) {
         self.len = 0;
         self.emitted = Spectrum::ZERO;
+        self.last_emitted = Spectrum::ZERO;
+        self.edges = 0;
     }
 
     fn push(&mut self) -> usize {
@@ -185,8 +192,10 @@ impl Subpath {
                 let (edge, next) = (&mut node.edge, &mut node.vertex);
                 scene.propagate(&from.vertex, direction, &flight, edge, next)?
             };
+            self.edges += 1;
             if end == End::Sensor {
-                self.emitted += beta.f * node.edge.emitted;
+                self.last_emitted = beta.f * node.edge.emitted;
+                self.emitted += self.last_emitted;
             }
             let arrived = alive && (end == End::Sensor || !node.vertex.is(VertexKind::Emitter));
             if !arrived {

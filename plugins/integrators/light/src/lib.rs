@@ -14,8 +14,9 @@
 
 use resolvent_api::abi::{ParamDecl, PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
-use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView, Spectrum};
+use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
+use resolvent_pathspace::features;
 use resolvent_pathspace::mis::Heuristic;
 use resolvent_pathspace::sampler::Purpose;
 
@@ -78,36 +79,43 @@ impl ParticleTracer {
                             out.splat(splat.film, splat.radiance)?;
                         }
                     }
-                    let mut sample = PixelSample::default();
-                    if scene.has(scene_traits::ENVIRONMENT) {
-                        sample.radiance =
-                            behind::<CHROMATIC>(scene, &mut paths, [x, y], &mut draws)?;
-                    }
+                    let sample = self.seen::<CHROMATIC>(
+                        scene,
+                        &mut paths,
+                        [x, y],
+                        &mut draws,
+                        tile.features != 0,
+                    )?;
                     out.add(x, y, &sample)?;
                 }
             }
         }
         Ok(())
     }
-}
 
-/// Lights at infinity that the camera's ray arrives at without scattering.
-fn behind<const CHROMATIC: bool>(
-    scene: &SceneView<'_>,
-    paths: &mut Bidirectional,
-    pixel: [u32; 2],
-    draws: &mut NetDraws,
-) -> Outcome<Spectrum> {
-    let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
-    let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? else {
-        return Ok(Spectrum::ZERO);
-    };
-    paths
-        .sensor
-        .from_sensor::<CHROMATIC, _>(scene, &ray, draws, 2)?;
-    match paths.sensor.nodes().get(1) {
-        Some(node) if node.vertex.is_infinite() => paths.hit(scene, 2),
-        _ => Ok(Spectrum::ZERO),
+    /// What the camera's ray meets: lights at infinity, if it does not scatter before, and the features of the picture.
+    fn seen<const CHROMATIC: bool>(
+        &self,
+        scene: &SceneView<'_>,
+        paths: &mut Bidirectional,
+        pixel: [u32; 2],
+        draws: &mut NetDraws,
+        wants_features: bool,
+    ) -> Outcome<PixelSample> {
+        let mut sample = PixelSample::default();
+        let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
+        let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? else {
+            return Ok(sample);
+        };
+        paths
+            .sensor
+            .from_sensor::<CHROMATIC, _>(scene, &ray, draws, 2)?;
+        let (met, edge) = paths.sensor.first();
+        features::fill(&mut sample, met, edge, scene.lanes(), wants_features);
+        if met.is_some_and(|v| v.is_infinite()) {
+            sample.radiance = paths.hit(scene, 2)?;
+        }
+        Ok(sample)
     }
 }
 

@@ -1,0 +1,228 @@
+//! A Markov chain in the space of primary samples (Kelemen et al. 2002).
+//!
+//! Numbers are made when they are asked for, and brought up to date when they are asked for again: a large step draws all of
+//! them anew, a small step moves each a little around the torus. Keys of streams, and the lane that leads, change with large
+//! steps alone, so that small steps move a flight's distance smoothly while its tail stays.
+
+use crate::bidirectional::{Draws, End};
+use crate::sampler::Purpose;
+use resolvent_api::rng::{Stream, derive};
+
+/// A group of four numbers and the key of the stream behind them.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    value: [f32; 4],
+    key: u64,
+    /// Step at which the value was last brought up to date; 0: never.
+    time: u64,
+}
+
+/// The chain.
+pub struct Chain {
+    numbers: Stream,
+    entries: Vec<Entry>,
+    /// Entries changed in the step in progress, as they were.
+    changed: Vec<(u32, Entry)>,
+    hero: (u32, u32),
+    lanes: u32,
+    sigma: f32,
+    step: u64,
+    last_large: u64,
+    /// The last large step before the one in progress.
+    large_before: u64,
+    is_large: bool,
+}
+
+impl Chain {
+    /// A chain whose small steps have the standard deviation `sigma`.
+    pub fn new(sigma: f32, lanes: u32) -> Self {
+        Self {
+            numbers: Stream::new(0),
+            entries: Vec::new(),
+            changed: Vec::new(),
+            hero: (0, 0),
+            lanes,
+            sigma,
+            step: 0,
+            last_large: 0,
+            large_before: 0,
+            is_large: true,
+        }
+    }
+
+    /// Starts anew: everything that follows is a function of `key`.
+    pub fn start(&mut self, key: u64) {
+        self.numbers = Stream::new(key);
+        self.entries.clear();
+        self.changed.clear();
+        self.step = 1;
+        self.last_large = 1;
+        self.large_before = 1;
+        self.is_large = true;
+        self.hero = (self.draw_hero(), 0);
+    }
+
+    fn draw_hero(&mut self) -> u32 {
+        ((self.numbers.uniform() * self.lanes as f32) as u32).min(self.lanes - 1)
+    }
+
+    /// A number that belongs to no state: for decisions about the chain itself.
+    pub fn uniform(&mut self) -> f32 {
+        self.numbers.uniform()
+    }
+
+    /// Proposes the next state.
+    pub fn propose(&mut self, large: bool) {
+        self.changed.clear();
+        self.step += 1;
+        self.is_large = large;
+        self.large_before = self.last_large;
+        self.hero.1 = self.hero.0;
+        if large {
+            self.last_large = self.step;
+            self.hero.0 = self.draw_hero();
+        }
+    }
+
+    /// Keeps the proposal.
+    pub fn accept(&mut self) {
+        self.changed.clear();
+    }
+
+    /// Goes back to the state before the proposal.
+    pub fn reject(&mut self) {
+        for (i, old) in self.changed.drain(..) {
+            self.entries[i as usize] = old;
+        }
+        self.hero.0 = self.hero.1;
+        self.last_large = self.large_before;
+        self.step -= 1;
+    }
+
+    /// The entry of a purpose, up to date.
+    fn entry(&mut self, end: End, bounce: u32, purpose: Purpose) -> Entry {
+        let i = ((bounce as usize) << 4) | (purpose as usize) << 1 | end as usize;
+        if i >= self.entries.len() {
+            self.entries.resize(i + 1, Entry::default());
+        }
+        let old = self.entries[i];
+        if old.time == self.step {
+            return old;
+        }
+        self.changed.push((i as u32, old));
+        let mut new = old;
+        if new.time < self.last_large {
+            let (a, b) = (self.numbers.uniform2(), self.numbers.uniform2());
+            new.value = [a[0], a[1], b[0], b[1]];
+            new.key = self.numbers.bits();
+            new.time = self.last_large;
+        }
+        // Small steps not yet taken add up to one of their joint variance.
+        let missed = self.step - new.time;
+        if missed > 0 {
+            let spread = self.sigma * (missed as f32).sqrt();
+            for v in &mut new.value {
+                *v = around(*v + spread * normal(&mut self.numbers));
+            }
+        }
+        new.time = self.step;
+        self.entries[i] = new;
+        new
+    }
+}
+
+/// Wraps onto [0, 1).
+fn around(v: f32) -> f32 {
+    let w = v - v.floor();
+    if w < 1.0 { w } else { 0.0 }
+}
+
+/// A standard normal variate (Box & Muller 1958).
+fn normal(s: &mut Stream) -> f32 {
+    let [a, b] = s.uniform2();
+    (-2.0 * (1.0 - a).ln()).sqrt() * (core::f32::consts::TAU * b).cos()
+}
+
+impl Draws for Chain {
+    fn four(&mut self, end: End, bounce: u32, purpose: Purpose) -> [f32; 4] {
+        self.entry(end, bounce, purpose).value
+    }
+
+    fn key(&mut self, end: End, bounce: u32, purpose: Purpose) -> u64 {
+        let key = self.entry(end, bounce, purpose).key;
+        derive(key, u64::from(bounce) * 8 + purpose as u64)
+    }
+
+    fn hero(&self) -> u32 {
+        self.hero.0
+    }
+
+    fn lanes(&self) -> u32 {
+        self.lanes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn state(c: &mut Chain) -> Vec<[f32; 4]> {
+        (0..5)
+            .map(|b| c.four(End::Light, b, Purpose::Flight))
+            .collect()
+    }
+
+    #[test]
+    fn rejection_restores_everything() {
+        let mut c = Chain::new(0.02, 3);
+        c.start(5);
+        let before = state(&mut c);
+        let key = c.key(End::Light, 2, Purpose::Flight);
+        for k in 0..100 {
+            c.propose(k % 3 == 0);
+            let moved = state(&mut c);
+            assert_ne!(before, moved);
+            let _ = c.four(End::Sensor, 7 + k, Purpose::Scatter);
+            c.reject();
+            assert_eq!(before, state(&mut c));
+            assert_eq!(key, c.key(End::Light, 2, Purpose::Flight));
+        }
+        c.propose(false);
+        let moved = state(&mut c);
+        c.accept();
+        assert_eq!(moved, state(&mut c));
+        assert_eq!(key, c.key(End::Light, 2, Purpose::Flight));
+    }
+
+    /// A chain that accepts everything stays uniform: mean and variance of a number over small and large steps, also of one
+    /// that is asked for now and then.
+    #[test]
+    fn states_stay_uniform() {
+        let mut c = Chain::new(0.05, 3);
+        c.start(11);
+        let n = 400_000;
+        let mut sums = [[0f64; 2]; 2];
+        let mut rare = 0;
+        for i in 0..n {
+            let large = c.uniform() < 0.2;
+            c.propose(large);
+            let a = f64::from(c.four(End::Sensor, 1, Purpose::Light)[2]);
+            sums[0][0] += a;
+            sums[0][1] += (a - 0.5).powi(2);
+            if i % 7 == 0 {
+                let b = f64::from(c.four(End::Light, 3, Purpose::Flight)[0]);
+                sums[1][0] += b;
+                sums[1][1] += (b - 0.5).powi(2);
+                rare += 1;
+            }
+            c.accept();
+        }
+        for (s, n) in sums.iter().zip([n, rare]) {
+            let n = f64::from(n);
+            // Correlation over about 5 steps between large ones.
+            let error = (10.0 / n).sqrt();
+            assert!((s[0] / n - 0.5).abs() < 4.0 * 0.289 * error, "{s:?}");
+            assert!((s[1] / n - 1.0 / 12.0).abs() < 4.0 * 0.075 * error, "{s:?}");
+        }
+    }
+}
