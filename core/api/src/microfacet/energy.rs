@@ -205,3 +205,84 @@ pub fn integrate(ggx: Ggx, wo: Vec3, eta: f32, n: u32) -> (f64, f64) {
     let cells = f64::from(n * n);
     (reflected / cells, transmitted / cells)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::warp::around_z;
+
+    fn round(alpha: f32) -> Ggx {
+        Ggx {
+            alpha: [alpha, alpha],
+        }
+    }
+
+    /// Between the nodes, the tables against the integrals they come from; at grazing angles they are coarser.
+    #[test]
+    fn tables_interpolate_the_integrals() {
+        for alpha in [0.003, 0.05, 0.22, 0.6, 0.95] {
+            let ggx = round(alpha);
+            let width = Width::of(&ggx);
+            for (mu, bound) in [(0.93, 0.004), (0.55, 0.005), (0.21, 0.007), (0.043, 0.02)] {
+                let wo = around_z(mu, 0.1);
+                let (e, _) = integrate(ggx, wo, f32::INFINITY, 64);
+                let d = f64::from(width.single(wo)) - e;
+                assert!(d.abs() < bound, "mirrors, {alpha} {mu}: off by {d}");
+                for eta in [1.02, 1.15, 1.5, 2.3] {
+                    let (r, t) = integrate(ggx, wo, eta, 64);
+                    let d = f64::from(width.reflected(mu, eta)) - r;
+                    assert!(d.abs() < bound, "reflected, {alpha} {mu} {eta}: off by {d}");
+                    let d = f64::from(width.total(mu, eta)) - (r + t);
+                    assert!(d.abs() < bound, "total, {alpha} {mu} {eta}: off by {d}");
+                    let (r, t) = integrate(ggx, wo, 1.0 / eta, 64);
+                    let d = f64::from(width.total(mu, 1.0 / eta)) - (r + t);
+                    assert!(d.abs() < bound, "inside, {alpha} {mu} {eta}: off by {d}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn anisotropic_mirrors() {
+        for alpha in [[1.0, 0.4], [0.2, 0.6], [0.5, 0.15]] {
+            let ggx = Ggx { alpha };
+            let width = Width::of(&ggx);
+            for turn in [0.03, 0.11, 0.2, 0.45] {
+                for mu in [0.9, 0.5, 0.3] {
+                    let wo = around_z(mu, turn);
+                    let (e, _) = integrate(ggx, wo, f32::INFINITY, 64);
+                    let d = f64::from(width.single(wo)) - e;
+                    assert!(d.abs() < 0.015, "{alpha:?} {mu} {turn}: off by {d}");
+                }
+            }
+        }
+    }
+
+    /// Averages are those of the interpolated values, to rounding.
+    #[test]
+    fn averages_are_exact() {
+        for alpha in [[0.3, 0.3], [0.8, 0.8], [0.9, 0.35]] {
+            let width = Width::of(&Ggx { alpha });
+            let n = 2000;
+            let at = |i: u32| (i as f32 + 0.5) / n as f32;
+            let mean = |f: &dyn Fn(f32) -> f32| {
+                let sum: f64 = (0..n).map(|i| f64::from(f(at(i).sqrt()))).sum();
+                sum / f64::from(n)
+            };
+            for eta in [1.3, 1.0 / 1.3] {
+                let d = mean(&|mu| width.total(mu, eta)) - f64::from(width.total_average(eta));
+                assert!(d.abs() < 2e-5, "{d}");
+                let r = width.reflected_average(eta);
+                let d = mean(&|mu| width.reflected(mu, eta)) - f64::from(r);
+                assert!(d.abs() < 2e-5, "{d}");
+            }
+            let around = |mu: f32| {
+                (0..64)
+                    .map(|k| width.single(around_z(mu, (k as f32 + 0.5) / 64.0)) / 64.0)
+                    .sum()
+            };
+            let d = mean(&around) - f64::from(width.single_average());
+            assert!(d.abs() < 1e-4, "{d}");
+        }
+    }
+}
