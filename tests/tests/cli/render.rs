@@ -21,6 +21,7 @@ fn every_example_renders() {
     for name in [
         "cloud/cloud.json",
         "fog-room/fog-room.json",
+        "materials/materials.json",
         "overlap/overlap.json",
     ] {
         with_light(name);

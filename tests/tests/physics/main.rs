@@ -12,6 +12,7 @@ mod judge;
 mod scenes;
 
 mod instances;
+mod materials;
 mod points;
 mod slab_flux;
 mod slab_radiance;

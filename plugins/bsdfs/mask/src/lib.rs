@@ -8,6 +8,7 @@
 //!
 //! A share `opacity` of the light meets the nested BSDF, the rest passes unchanged, as through holes too small to be seen. It is
 //! UsdPreviewSurface's `opacity` (with `opacityThreshold` as `cutoff`) and glTF's alpha (BLEND, and MASK with `alphaCutoff`).
+//! Holes belong in sheets: in the boundary of a refracting body they let light in that no light could get out by.
 //! What passes is a delta lobe: a light is found behind it by walking on, not by connecting to it.
 //!
 //! ```json
