@@ -102,11 +102,13 @@ fn each_sample(
     path: impl Fn(&Sampler, [u32; 2], bool) -> Outcome<PixelSample>,
 ) -> Outcome<()> {
     let features = tile.features != 0;
+    let vacuum = !scene.has(scene_traits::MEDIA);
     for y in tile.min[1]..tile.max[1] {
         for x in tile.min[0]..tile.max[0] {
             let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
             for i in tile.sample_begin..tile.sample_end {
-                let sampler = Sampler::new(tile.seed, pixel, i, scene.lanes());
+                let sampler =
+                    Sampler::new(tile.seed, pixel, i, scene.lanes()).without_flights(vacuum);
                 let sample = path(&sampler, [x, y], features)?;
                 out.add(x, y, &sample)?;
             }
