@@ -1,6 +1,7 @@
 //! From a description to a scene: plugins, geometry, lights, and the facts that choose the kernels.
 
 use super::instances::{Copies, Groups, emits};
+use super::interiors::{Collected, Interior, Interiors};
 use super::shapes::{Wide, affine};
 use super::{Material, PlacedMedium, Surface};
 use crate::camera::Camera;
@@ -20,9 +21,6 @@ use std::time::Instant;
 /// Lanes in use: red, green and blue.
 pub const RGB_LANES: u32 = 3;
 
-/// Interior media are kept as bits of a set.
-const MAX_INTERIORS: usize = 64;
-
 /// What building a scene took.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Preparation {
@@ -40,7 +38,8 @@ pub struct Scene {
     /// Behind the shapes that stand by themselves; see [`Scene::surface`].
     pub(crate) surfaces: Vec<Surface>,
     pub(crate) copies: Copies,
-    pub(crate) has_null_surfaces: bool,
+    pub(crate) interiors: Interiors,
+    pub(crate) has_passable_surfaces: bool,
     /// All media absorb only.
     pub(crate) fades: bool,
     /// Some medium's extinction differs between lanes.
@@ -111,31 +110,39 @@ impl Scene {
                 name: name.clone(),
                 medium,
                 free,
+                interiors: 0,
             });
         }
         let media_seconds = media_start.elapsed().as_secs_f64();
-        if media.len() > MAX_INTERIORS && media.iter().any(|m| !m.free) {
-            return Err(Error::Input(format!(
-                "{} media with interiors among them; interiors work with at most {MAX_INTERIORS} media",
-                media.len()
-            )));
-        }
-
         let geometry_start = Instant::now();
         let mut lights: Vec<Light> = Vec::new();
         let mut surfaces = Vec::new();
         let mut shapes = Vec::new();
+        let mut collected = Collected::default();
+        let priorities = scene.all_shapes().map(|s| s.priority);
+        let lowest = priorities.min().unwrap_or(0);
         // What stands behind a shape, emission aside; the material of an instance replaces its own.
         let mut behind = |described: &describe::Shape, replaced: Option<&str>| -> Result<Surface> {
             let material = match replaced.or(described.material.as_deref()) {
                 Some(name) => Some(material(name, scene, registry, lanes, &mut materials)?),
                 None => None,
             };
-            let interior = described
+            let ior = material.map_or(1.0, |m| materials[m as usize].bsdf.ior());
+            let medium = described
                 .interior
                 .as_deref()
                 .and_then(|name| scene.media.get_index_of(name))
                 .and_then(|k| media_of[k]);
+            // A vacuum matters only where it displaces something.
+            let hollow = described.interior.is_some() && described.priority > lowest;
+            let interior = (medium.is_some() || ior != 1.0 || hollow).then(|| {
+                collected.add(Interior {
+                    medium,
+                    material,
+                    ior,
+                    priority: described.priority,
+                })
+            });
             Ok(Surface {
                 material,
                 light: None,
@@ -144,6 +151,7 @@ impl Scene {
                     None => described.interior.is_some(),
                     Some(m) => materials_null(&materials, m),
                 },
+                hidden_by: 0,
             })
         };
         for (described, wide) in scene.shapes.iter().zip(wide) {
@@ -190,6 +198,7 @@ impl Scene {
                         light: Some(lights.len() as u32 - 1),
                         interior: None,
                         null: false,
+                        hidden_by: 0,
                     });
                     shapes.push(Shape::Quad(quad));
                 }
@@ -200,7 +209,7 @@ impl Scene {
         let (prototypes, placed) = groups.geometry(centre)?;
         let accel = Accel::build_instanced(Geometry { shapes }, prototypes, &placed)
             .map_err(|e| Error::Input(format!("{}: {e}", scene.source.file.display())))?;
-        let copies = match &accel {
+        let mut copies = match &accel {
             Some(accel) if accel.stats().instances > 0 => {
                 groups.surfaces(accel, &placed, &mut behind, |described, shape, at, size| {
                     let radiance = spectrum(described.emission.unwrap_or_default());
@@ -211,6 +220,16 @@ impl Scene {
             }
             _ => Copies::default(),
         };
+        let interiors = collected
+            .sort(surfaces.iter_mut().chain(copies.surfaces_mut()))
+            .map_err(|n| {
+                Error::Input(format!(
+                    "{n} interiors of shapes that differ in medium, material, index of refraction or priority; at most 64 can be told apart"
+                ))
+            })?;
+        for (i, m) in (0..).zip(&mut media) {
+            m.interiors = interiors.filled_by(i);
+        }
         drop((groups, placed));
         let geometry_seconds = geometry_start.elapsed().as_secs_f64();
 
@@ -242,7 +261,10 @@ impl Scene {
             c.focus_distance,
             Filter::new(scene.film.filter),
         );
-        let has_null_surfaces = surfaces.iter().chain(copies.surfaces()).any(|s| s.null);
+        let has_passable_surfaces = surfaces
+            .iter()
+            .chain(copies.surfaces())
+            .any(|s| s.null || s.hidden_by != 0);
         let fades = media.iter().all(absorbs_only);
         let chromatic = media.iter().any(|m| is_chromatic(m, lanes));
         let mut traits = traits(&media, accel.is_some(), &lights);
@@ -258,7 +280,8 @@ impl Scene {
             accel,
             surfaces,
             copies,
-            has_null_surfaces,
+            interiors,
+            has_passable_surfaces,
             fades,
             chromatic,
             materials,

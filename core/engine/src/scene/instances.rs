@@ -28,6 +28,10 @@ impl Copies {
         &self.surfaces
     }
 
+    pub(super) fn surfaces_mut(&mut self) -> &mut [Surface] {
+        &mut self.surfaces
+    }
+
     /// Adds an instance whose surfaces are those of an earlier one.
     fn share(&mut self, first: u32) {
         self.first.push(first);

@@ -79,9 +79,10 @@ impl View<'_> {
 
     /// Transmittance of media that absorb only, as a flight that always arrives.
     fn fade(&self, s: &Segment, inside: u64, u: &FlightDraws) -> Result<(Flight, bool), Status> {
+        let inside = self.scene.interiors.filling(inside);
         let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
         for (i, m) in self.scene.media.iter().enumerate() {
-            let Some(clipped) = within(m, i, inside, s) else {
+            let Some(clipped) = within(m, inside, s) else {
                 continue;
             };
             let flight = self.transmittance(m, &clipped, &keyed(u, i))?;
@@ -110,11 +111,12 @@ impl View<'_> {
         u: &FlightDraws,
     ) -> Result<Passage, Status> {
         let media = &self.scene.media;
+        let inside = self.scene.interiors.filling(inside);
         // Find the nearest collision; a flight that starts beyond what is already reached need not be sampled.
         let (mut reached, mut winner, mut met) = (s.t1, None, 0u32);
         let mut last = 0;
         for (i, m) in media.iter().enumerate() {
-            let Some(clipped) = within(m, i, inside, &Segment { t1: reached, ..*s }) else {
+            let Some(clipped) = within(m, inside, &Segment { t1: reached, ..*s }) else {
                 continue;
             };
             let flight = self.flight(m, &clipped, &keyed(u, i))?;
@@ -145,7 +147,7 @@ impl View<'_> {
             }
             // The winner's segment must not be cut, or its collision would count as survival.
             let end = if winner == Some(i) { s.t1 } else { reached };
-            let Some(clipped) = within(m, i, inside, &Segment { t1: end, ..*s }) else {
+            let Some(clipped) = within(m, inside, &Segment { t1: end, ..*s }) else {
                 continue;
             };
             let flight = self.flight(m, &clipped, &u)?;
@@ -198,8 +200,9 @@ impl View<'_> {
             }
             _ => {
                 let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
+                let inside = self.scene.interiors.filling(inside);
                 for (i, m) in self.scene.media.iter().enumerate() {
-                    let Some(clipped) = within(m, i, inside, s) else {
+                    let Some(clipped) = within(m, inside, s) else {
                         continue;
                     };
                     let flight = self.transmittance(m, &clipped, &keyed(u, i))?;
@@ -219,8 +222,9 @@ impl View<'_> {
     /// Approximate optical depth of a segment.
     pub(super) fn depth(&self, s: &Segment, inside: u64) -> Result<Spectrum, Status> {
         let mut depth = Spectrum::ZERO;
-        for (i, m) in self.scene.media.iter().enumerate() {
-            let Some(clipped) = within(m, i, inside, s) else {
+        let inside = self.scene.interiors.filling(inside);
+        for m in &self.scene.media {
+            let Some(clipped) = within(m, inside, s) else {
                 continue;
             };
             self.count(|c| c.depths += 1);
@@ -299,10 +303,10 @@ fn clip(bounds: Aabb, s: &Segment) -> Option<Segment> {
     Some(Segment { t0, t1, ..*s })
 }
 
-/// The part of a segment that medium `i` can act on.
+/// The part of a segment that a medium can act on; `filling` are the interiors that are not displaced.
 #[inline(always)]
-fn within(m: &PlacedMedium, i: usize, inside: u64, s: &Segment) -> Option<Segment> {
-    if !m.free && (i >= 64 || inside >> i & 1 == 0) {
+fn within(m: &PlacedMedium, filling: u64, s: &Segment) -> Option<Segment> {
+    if !m.free && filling & m.interiors == 0 {
         return None;
     }
     clip(m.medium.info.bounds, s)

@@ -2,6 +2,7 @@
 
 mod build;
 mod instances;
+mod interiors;
 mod media;
 mod shapes;
 mod transport;
@@ -19,10 +20,20 @@ pub struct Surface {
     pub material: Option<u32>,
     /// Index of the light it is, if it emits.
     pub light: Option<u32>,
-    /// Index of the medium inside.
+    /// What is inside, as a bit of the sets that say where a point is.
     pub interior: Option<u32>,
     /// Light passes as if it were not there.
     pub null: bool,
+    /// Bits of the interiors within which it is not there.
+    pub hidden_by: u64,
+}
+
+impl Surface {
+    /// True if a ray that is inside of `inside` passes as if it were not there.
+    #[inline(always)]
+    pub(crate) fn passes(&self, inside: u64) -> bool {
+        self.null || self.hidden_by & inside != 0
+    }
 }
 
 /// A material of the scene.
@@ -41,4 +52,6 @@ pub struct PlacedMedium {
     pub medium: ForeignMedium,
     /// Stands free, bounded by itself; otherwise it fills shapes.
     pub free: bool,
+    /// Bits of the interiors that it fills.
+    pub interiors: u64,
 }

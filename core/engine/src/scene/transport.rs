@@ -1,7 +1,7 @@
 //! G for the whole scene: the next vertex along a ray, and connections to lights.
 
 use super::view::View;
-use super::{Scene, media};
+use super::{Scene, Surface, media};
 use crate::geometry::{Hit, Ray, SurfacePoint, offset_origin};
 use crate::light::{Light, shows};
 use resolvent_api::abi::{Status, scene_traits};
@@ -21,7 +21,7 @@ use resolvent_api::{Event, Spectrum};
 const MAX_BOUNDARIES: u32 = 100_000;
 
 impl Scene {
-    /// Origin and surrounding interior media of a ray that leaves `from` in direction `wi`.
+    /// Origin and surrounding interiors of a ray that leaves `from` in direction `wi`.
     #[inline(always)]
     pub(super) fn leave(&self, from: &Vertex, wi: Vec3) -> (Vec3, u64) {
         let p = Vec3::from(from.p);
@@ -38,7 +38,7 @@ impl Scene {
         (offset_origin(p, from.p_error.into(), ng, wi), inside)
     }
 
-    /// The interior media behind a shape's surface, seen in direction `d`.
+    /// The interiors behind a shape's surface, seen in direction `d`.
     #[inline(always)]
     fn cross(&self, shape: u32, ng: Vec3, d: Vec3, inside: u64) -> u64 {
         match self.surface(shape).interior {
@@ -48,15 +48,18 @@ impl Scene {
         }
     }
 
-    fn has_interiors(&self) -> bool {
-        let all = self.surfaces.iter().chain(self.copies.surfaces());
-        all.into_iter().any(|s| s.interior.is_some())
+    /// Index of refraction on the outer side of a surface, of a ray that met it inside of `inside`: what the point is in, the shape
+    /// itself aside.
+    #[inline(always)]
+    fn outside_ior(&self, surface: &Surface, inside: u64) -> f32 {
+        let own = surface.interior.map_or(0, |i| 1 << i);
+        self.interiors.ior(inside & !own)
     }
 
-    /// The interior media at a point: the boundaries a ray from there leaves without having entered.
+    /// The interiors at a point: the boundaries a ray from there leaves without having entered.
     pub(super) fn interiors_at(&self, p: Vec3) -> u64 {
         let Some(accel) = &self.accel else { return 0 };
-        if !self.has_interiors() {
+        if self.interiors.is_empty() {
             return 0;
         }
         // A direction without symmetry, so that edges of axis-aligned shapes are not met.
@@ -204,7 +207,7 @@ impl View<'_> {
             edge.length += hit.t;
             let at = self.scene.accel.as_ref().map(|a| a.interaction(&hit, &ray));
             let Some(at) = at else { return Ok(false) };
-            if !self.scene.surface(hit.shape).null {
+            if !self.scene.surface(hit.shape).passes(inside) {
                 next.inside = inside;
                 return self.surface_vertex(&at, d, next);
             }
@@ -330,7 +333,7 @@ impl View<'_> {
             frame: next.frame,
             uv: next.uv,
             lanes: self.scene.lanes,
-            outside_ior: 1.0,
+            outside_ior: self.scene.outside_ior(surface, next.inside),
         };
         material
             .bsdf
@@ -374,7 +377,7 @@ impl View<'_> {
         let ray = self.towards(o, to);
         if SURFACES && let Some(accel) = &self.scene.accel {
             self.count(|c| c.shadow_rays += 1);
-            if self.scene.has_null_surfaces {
+            if self.scene.has_passable_surfaces {
                 return self.join_through::<MEDIA>(ray, inside, u, edge);
             }
             if accel.occluded(&ray) {
@@ -414,7 +417,7 @@ impl View<'_> {
         for boundary in 0..MAX_BOUNDARIES {
             let hit = accel.closest(&ray);
             if let Some(h) = &hit
-                && !self.scene.surface(h.shape).null
+                && !self.scene.surface(h.shape).passes(inside)
             {
                 return Ok(false);
             }
