@@ -13,6 +13,7 @@ mod scenes;
 
 mod instances;
 mod materials;
+mod nested;
 mod points;
 mod slab_flux;
 mod slab_radiance;

@@ -8,7 +8,7 @@ use resolvent_api::medium::{MediumInfo, medium_traits};
 use resolvent_api::operator::{Coefficients, Flight, FlightDraws, Segment};
 use resolvent_api::phase::MediumPoint;
 use resolvent_api::surface::{SurfacePoint, bsdf_traits};
-use resolvent_api::{Closure, Event, PluginKind, Spectrum, Vec3};
+use resolvent_api::{Closure, Event, PluginKind, Scatter, Spectrum, Vec3};
 use std::ffi::c_void;
 use std::sync::Arc;
 
@@ -257,6 +257,20 @@ impl ForeignBsdf {
     /// Index of refraction inside, see [`resolvent_api::Bsdf::ior`].
     pub fn ior(&self) -> f32 {
         self.ior
+    }
+
+    /// True if it bends light that comes from twice as dense a medium: also a boundary whose inside is vacuum does.
+    pub fn refracts(&self) -> bool {
+        if self.ior != 1.0 {
+            return true;
+        }
+        let mut closure = Closure::EMPTY;
+        let at = SurfacePoint {
+            outside_ior: 2.0,
+            ..SurfacePoint::default()
+        };
+        // One that fails here fails at its vertices, where it can say so.
+        self.closure(&at, &mut closure).is_ok() && closure.eta() != 1.0
     }
 
     /// True if light passes unchanged.

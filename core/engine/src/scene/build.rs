@@ -133,8 +133,13 @@ impl Scene {
                 .as_deref()
                 .and_then(|name| scene.media.get_index_of(name))
                 .and_then(|k| media_of[k]);
+            let null = match material {
+                None => described.interior.is_some(),
+                Some(m) => materials_null(&materials, m),
+            };
             // A vacuum matters only where it displaces something.
-            let hollow = described.interior.is_some() && described.priority > lowest;
+            let hollow = described.priority > lowest
+                && (null || material.is_some_and(|m| materials[m as usize].bsdf.refracts()));
             let interior = (medium.is_some() || ior != 1.0 || hollow).then(|| {
                 collected.add(Interior {
                     medium,
@@ -147,10 +152,7 @@ impl Scene {
                 material,
                 light: None,
                 interior,
-                null: match material {
-                    None => described.interior.is_some(),
-                    Some(m) => materials_null(&materials, m),
-                },
+                null,
                 hidden_by: 0,
             })
         };
