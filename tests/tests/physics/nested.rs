@@ -332,3 +332,75 @@ fn cut_outs() {
     }
     run("cut_outs", &cases);
 }
+
+/// Parts of one body: layers of glass that overlap are one sheet, whether as shapes or copies; a hollow body is two sheets; and parts
+/// of a fog that overlap are no thicker.
+#[test]
+fn one_body() {
+    let mut cases = Vec::new();
+    for degrees in [5.0, 40.0, 60.0f64] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let view = || scenes::scene([-3.0 * sin / cos, 0.3, 3.0], [sin, 0.0, -cos]);
+        let (r, _) = fresnel(cos, 1.0, 1.5);
+        let one = (1.0 - r) / (1.0 + r);
+        let reflected = 2.0 * r / (1.0 + r);
+        for (what, exact) in [
+            ("shapes", one),
+            ("copies", one),
+            ("hollow", one * one / (1.0 - reflected * reflected)),
+        ] {
+            let mut scene = view();
+            dielectric(&mut scene, "glass", 1.5);
+            scenes::add(&mut scene, "shapes", lamp(-6.0));
+            let glass = [("material", "glass")];
+            match what {
+                "shapes" => {
+                    add(&mut scene, layer(-1.0, 0.0), 0, &glass);
+                    add(&mut scene, layer(-1.7, -0.4), 0, &glass);
+                    add(&mut scene, layer(-0.8, -0.6), 0, &glass);
+                }
+                "copies" => {
+                    let mut part = layer(-1.0, 0.0);
+                    part["material"] = json!("glass");
+                    scene["prototypes"]["part"] = json!([part]);
+                    let copy = |t: Value| json!({ "prototype": "part", "transform": t });
+                    scene["instances"] = json!([
+                        copy(json!([{ "scale": [1, 1, 1] }])),
+                        copy(json!([{ "scale": [1, 1, -0.5] }, { "translate": [0, 0, -1.3] }])),
+                    ]);
+                }
+                _ => {
+                    let mut cavity = cuboid([-2.9e3, -2.9e3, -2.0], [2.9e3, 2.9e3, -1.0]);
+                    for t in cavity["indices"].as_array_mut().into_iter().flatten() {
+                        if let Some(t) = t.as_array_mut() {
+                            t.swap(1, 2);
+                        }
+                    }
+                    add(&mut scene, layer(-3.0, 0.0), 0, &glass);
+                    add(&mut scene, cavity, 0, &glass);
+                }
+            }
+            cases.push(Case {
+                name: format!("{what} at {degrees} degrees"),
+                scene,
+                exact,
+                share: 0.002,
+            });
+        }
+        let mut scene = view();
+        scenes::add(&mut scene, "lights", scenes::dome(1.0));
+        scenes::medium(&mut scene, "fog", json!({ "sigma_t": 0.7, "albedo": 0 }));
+        for (low, high) in [(-1.0, 0.0), (-1.7, -0.4), (-0.8, -0.6)] {
+            // No larger than needed: distances have the error of the triangles' size.
+            let part = cuboid([-10.0, -10.0, low], [10.0, 10.0, high]);
+            add(&mut scene, part, 0, &[("interior", "fog")]);
+        }
+        cases.push(Case {
+            name: format!("fog at {degrees} degrees"),
+            scene,
+            exact: (-0.7f64 * 1.7 / cos).exp(),
+            share: 0.003,
+        });
+    }
+    run("one_body", &cases);
+}

@@ -143,7 +143,6 @@ impl Scene {
             let interior = (medium.is_some() || ior != 1.0 || hollow).then(|| {
                 collected.add(Interior {
                     medium,
-                    material,
                     ior,
                     priority: described.priority,
                 })
@@ -154,6 +153,7 @@ impl Scene {
                 interior,
                 null,
                 hidden_by: 0,
+                body: 0,
             })
         };
         for (described, wide) in scene.shapes.iter().zip(wide) {
@@ -201,6 +201,7 @@ impl Scene {
                         interior: None,
                         null: false,
                         hidden_by: 0,
+                        body: 0,
                     });
                     shapes.push(Shape::Quad(quad));
                 }
@@ -226,7 +227,7 @@ impl Scene {
             .sort(surfaces.iter_mut().chain(copies.surfaces_mut()))
             .map_err(|n| {
                 Error::Input(format!(
-                    "{n} interiors of shapes that differ in medium, material, index of refraction or priority; at most 64 can be told apart"
+                    "{n} interiors of shapes that differ in medium, index of refraction or priority; at most 64 can be told apart"
                 ))
             })?;
         for (i, m) in (0..).zip(&mut media) {
@@ -266,7 +267,7 @@ impl Scene {
         let has_passable_surfaces = surfaces
             .iter()
             .chain(copies.surfaces())
-            .any(|s| s.null || s.hidden_by != 0);
+            .any(Surface::may_pass);
         let fades = media.iter().all(absorbs_only);
         let chromatic = media.iter().any(|m| is_chromatic(m, lanes));
         let mut traits = traits(&media, accel.is_some(), &lights);

@@ -1,10 +1,12 @@
 //! What fills closed shapes, and which of it fills the places where they overlap: nested dielectrics with priorities.
 //!
-//! A point is inside a set of shapes, kept as bits. Of these the ones of the highest priority fill the point: their media superpose,
-//! their index of refraction holds; all others are displaced. A surface of a shape at a point that one of higher priority fills is
-//! not there: rays pass it, and only the set changes (Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images").
+//! A set says in which bodies a point is: for every interior a small counter, packed into 64 bits. Shapes that are filled alike (the
+//! same medium, index of refraction and priority) count as one body, so that its boundary may consist of several shapes, and copies of
+//! it may overlap. Of the interiors that a point is in, those of the highest priority fill it: their media superpose, their index of
+//! refraction holds, and all others are displaced. A surface of a body at a point that another of higher priority fills is not there:
+//! rays pass it, and only the set changes (Schmidt and Budge 2002, "Simple Nested Dielectrics in Ray Traced Images").
 //!
-//! Bits are sorted, so that what fills a point is found by its lowest bit.
+//! Counters are sorted, so that what fills a point is found by the lowest bit.
 
 use super::Surface;
 
@@ -16,8 +18,6 @@ const MAX_INTERIORS: usize = 64;
 pub(super) struct Interior {
     /// Index of its medium, if it has one.
     pub medium: Option<u32>,
-    /// Index of the material of its surface.
-    pub material: Option<u32>,
     /// Index of refraction.
     pub ior: f32,
     /// The higher displaces the lower.
@@ -29,8 +29,10 @@ pub(super) struct Interior {
 #[derive(Default)]
 pub(crate) struct Interiors {
     all: Vec<Interior>,
-    /// For each, those of its priority.
+    /// For each, the counters of its priority.
     equal: Vec<u64>,
+    /// Bits of a counter.
+    width: u32,
     /// Some refract, or their priorities differ: otherwise all media superpose in vacuum, and no set needs to be looked at.
     nest: bool,
 }
@@ -45,8 +47,8 @@ impl Collected {
         self.0.len() as u32 - 1
     }
 
-    /// Gives every shape a bit of its own, or if they are too many, all that are filled alike one together. (Where two of these
-    /// overlap, leaving one counts as leaving both.) `surfaces` then refer to those bits and know what hides them.
+    /// Gives every interior a counter, as wide as there is room: with up to 8 of them 255 copies of a body may overlap, with more than 32
+    /// only one. `surfaces` then refer to those and know what hides them.
     ///
     /// # Errors
     /// How many different ones there are, if they are too many.
@@ -54,57 +56,58 @@ impl Collected {
         self,
         surfaces: impl Iterator<Item = &'s mut Surface>,
     ) -> Result<Interiors, usize> {
-        // (the interior, where it was collected)
-        let mut order: Vec<(Interior, Vec<u32>)> = Vec::new();
-        let apart = self.0.len() <= MAX_INTERIORS;
-        for (i, interior) in (0..).zip(self.0) {
-            match order.iter_mut().find(|(o, _)| !apart && *o == interior) {
-                Some((_, members)) => members.push(i),
-                None => order.push((interior, vec![i])),
+        let mut all: Vec<Interior> = Vec::new();
+        for interior in &self.0 {
+            if !all.contains(interior) {
+                all.push(*interior);
             }
         }
-        if order.len() > MAX_INTERIORS {
-            return Err(order.len());
+        if all.len() > MAX_INTERIORS {
+            return Err(all.len());
         }
         let distance = |i: &Interior| i.ior.ln().abs();
-        order.sort_by(|(a, _), (b, _)| {
+        all.sort_by(|a, b| {
             let by_priority = b.priority.cmp(&a.priority);
             by_priority.then(distance(b).total_cmp(&distance(a)))
         });
-        let all: Vec<Interior> = order.iter().map(|(i, _)| *i).collect();
-        let those = |f: &dyn Fn(&Interior) -> bool| {
-            let bits = all.iter().enumerate().filter(|(_, i)| f(i));
-            bits.fold(0u64, |set, (k, _)| set | 1 << k)
+        let width = match all.len() {
+            0..=8 => 8,
+            9..=16 => 4,
+            17..=32 => 2,
+            _ => 1,
         };
-        let equal = all
+        let mut interiors = Interiors {
+            nest: all
+                .iter()
+                .any(|i| i.ior != 1.0 || i.priority != all[0].priority),
+            equal: Vec::new(),
+            width,
+            all,
+        };
+        let all = &interiors.all;
+        interiors.equal = all
             .iter()
-            .map(|a| those(&|b| b.priority == a.priority))
+            .map(|a| interiors.those(|b| b.priority == a.priority))
             .collect();
-        let mut bit_of = vec![0; order.iter().map(|(_, m)| m.len()).sum()];
-        for (bit, (_, members)) in (0..).zip(&order) {
-            for &m in members {
-                bit_of[m as usize] = bit;
-            }
-        }
         for surface in surfaces {
-            let Some(interior) = &mut surface.interior else {
+            let Some(interior) = surface.interior else {
                 continue;
             };
-            *interior = bit_of[*interior as usize];
-            if surface.light.is_some() {
-                // Lights are met wherever they are, since connections lead to them.
-                continue;
+            let own = self.0[interior as usize];
+            surface.interior = interiors
+                .all
+                .iter()
+                .position(|i| *i == own)
+                .map(|i| i as u32);
+            // Lights are met wherever they are, since connections lead to them.
+            if surface.light.is_none() {
+                surface.hidden_by = interiors.those(|b| b.priority > own.priority);
+                if own.ior != 1.0 {
+                    surface.body = interiors.those(|b| *b == own);
+                }
             }
-            let own = all[*interior as usize];
-            // Where two equal dielectrics overlap they are one body.
-            let one_body = own.ior != 1.0;
-            let hides = |b: &Interior| b.priority > own.priority || (one_body && *b == own);
-            surface.hidden_by = those(&hides) & !(1 << *interior);
         }
-        let nest = all
-            .iter()
-            .any(|i| i.ior != 1.0 || i.priority != all[0].priority);
-        Ok(Interiors { all, equal, nest })
+        Ok(interiors)
     }
 }
 
@@ -113,11 +116,52 @@ impl Interiors {
         self.all.is_empty()
     }
 
-    /// Those that a medium fills.
+    /// The counters of some.
+    fn those(&self, wanted: impl Fn(&Interior) -> bool) -> u64 {
+        let counter = u64::MAX >> (64 - self.width);
+        let wanted = self.all.iter().enumerate().filter(|(_, i)| wanted(i));
+        wanted.fold(0, |set, (k, _)| set | counter << (self.width * k as u32))
+    }
+
+    /// The counters of those that a medium fills.
     pub fn filled_by(&self, medium: u32) -> u64 {
-        let bits = self.all.iter().enumerate();
-        bits.filter(|(_, i)| i.medium == Some(medium))
-            .fold(0, |set, (k, _)| set | 1 << k)
+        self.those(|i| i.medium == Some(medium))
+    }
+
+    /// The counter of one of them.
+    #[inline(always)]
+    fn counter(&self, interior: u32) -> u64 {
+        (u64::MAX >> (64 - self.width)) << (self.width * interior)
+    }
+
+    /// A set without one of them.
+    #[inline(always)]
+    pub fn without(&self, interior: u32, inside: u64) -> u64 {
+        inside & !self.counter(interior)
+    }
+
+    /// The set behind a boundary of one of them.
+    #[inline(always)]
+    pub fn entered(&self, interior: u32, inside: u64) -> u64 {
+        let counter = self.counter(interior);
+        if inside & counter == counter {
+            return inside;
+        }
+        inside + (1 << (self.width * interior))
+    }
+
+    /// The set before a boundary of one of them.
+    #[inline(always)]
+    pub fn left(&self, interior: u32, inside: u64) -> u64 {
+        if inside & self.counter(interior) == 0 {
+            return inside;
+        }
+        inside - (1 << (self.width * interior))
+    }
+
+    /// True if a set has one of them.
+    pub fn has(&self, interior: u32, inside: u64) -> bool {
+        inside & self.counter(interior) != 0
     }
 
     /// Those of a set which are not displaced by others.
@@ -126,7 +170,7 @@ impl Interiors {
         if !self.nest || inside == 0 {
             return inside;
         }
-        inside & self.equal[inside.trailing_zeros() as usize]
+        inside & self.equal[(inside.trailing_zeros() / self.width) as usize]
     }
 
     /// Index of refraction in a set.
@@ -135,7 +179,7 @@ impl Interiors {
         if !self.nest || inside == 0 {
             return 1.0;
         }
-        self.all[inside.trailing_zeros() as usize].ior
+        self.all[(inside.trailing_zeros() / self.width) as usize].ior
     }
 }
 
@@ -146,25 +190,18 @@ mod tests {
     fn interior(medium: Option<u32>, ior: f32, priority: i32) -> Interior {
         Interior {
             medium,
-            material: Some(0),
             ior,
             priority,
         }
     }
 
-    fn surface(interior: u32) -> Surface {
-        Surface {
-            material: Some(0),
-            light: None,
-            interior: Some(interior),
-            null: false,
-            hidden_by: 0,
-        }
-    }
-
     fn collect(all: &[Interior]) -> (Result<Interiors, usize>, Vec<Surface>) {
         let mut collected = Collected::default();
-        let mut surfaces: Vec<Surface> = all.iter().map(|i| surface(collected.add(*i))).collect();
+        let surface = |i: &Interior| Surface {
+            interior: Some(collected.add(*i)),
+            ..Surface::default()
+        };
+        let mut surfaces: Vec<Surface> = all.iter().map(surface).collect();
         let interiors = collected.sort(surfaces.iter_mut());
         (interiors, surfaces)
     }
@@ -179,49 +216,73 @@ mod tests {
             interior(Some(1), 1.0, 0),
         ]);
         let all = all.unwrap();
-        let bit = |i: usize| 1u64 << surfaces[i].interior.unwrap();
-        let set = |of: &[usize]| of.iter().fold(0, |s, i| s | bit(*i));
-        let hidden = |i: usize, inside: u64| surfaces[i].hidden_by & inside != 0;
+        let own = |i: usize| surfaces[i].interior.unwrap();
+        let set = |of: &[usize]| of.iter().fold(0, |s, i| all.entered(own(*i), s));
+        // On the way in.
+        let hidden = |i: usize, inside: u64| surfaces[i].passes(inside, false);
         // The milk's surface within the glass is not there, nor is the glass's within the ice.
-        assert!(hidden(milk, set(&[glass, milk])) && !hidden(glass, set(&[glass, milk])));
+        assert!(hidden(milk, set(&[glass])) && !hidden(glass, set(&[milk])));
         assert!(hidden(glass, set(&[ice])) && !hidden(ice, set(&[glass, milk])));
-        assert!(!hidden(milk, set(&[milk, fog])) && hidden(fog, set(&[milk])));
-        assert_eq!(all.filling(set(&[milk, glass, fog])), bit(glass));
-        assert_eq!(all.filling(set(&[milk, fog])), bit(milk));
-        assert_eq!(all.filling(set(&[fog])), bit(fog));
+        assert!(!hidden(milk, set(&[fog])) && hidden(fog, set(&[milk])));
+        assert_eq!(all.filling(set(&[milk, glass, fog])), set(&[glass]));
+        assert_eq!(all.filling(set(&[milk, fog])), set(&[milk]));
+        assert_eq!(all.filling(set(&[fog])), set(&[fog]));
         assert_eq!(all.ior(set(&[milk, glass])), 1.5);
         assert_eq!(all.ior(set(&[milk, fog])), 1.35);
         assert_eq!((all.ior(set(&[fog])), all.ior(0)), (1.0, 1.0));
-        assert_eq!((all.filled_by(0), all.filled_by(1)), (bit(milk), bit(fog)));
+        assert!(all.filled_by(0) & set(&[milk]) != 0 && all.filled_by(0) & set(&[fog]) == 0);
     }
 
     #[test]
     fn media_of_equal_priority_superpose() {
         let (all, surfaces) = collect(&[interior(Some(0), 1.0, 0), interior(Some(1), 1.0, 0)]);
         let all = all.unwrap();
-        assert_eq!((all.filling(3), all.ior(3), all.nest), (3, 1.0, false));
-        assert!(surfaces.iter().all(|s| s.hidden_by == 0));
+        let both = all.entered(1, all.entered(0, 0));
+        assert_eq!(
+            (all.filling(both), all.ior(both), all.nest),
+            (both, 1.0, false)
+        );
+        assert!(surfaces.iter().all(|s| s.hidden_by == 0 && s.body == 0));
         // In foggy water, the index is the water's.
         let (all, surfaces) = collect(&[interior(Some(0), 1.0, 0), interior(None, 1.33, 0)]);
         let all = all.unwrap();
-        assert_eq!((all.filling(3), all.ior(3)), (3, 1.33));
+        assert_eq!((all.filling(both), all.ior(both)), (both, 1.33));
         assert!(surfaces.iter().all(|s| s.hidden_by == 0));
     }
 
+    /// Pieces of ice that overlap: the surface of the one within the other is not there, on the way in and on the way out.
     #[test]
-    fn equal_bodies_are_one() {
+    fn copies_of_a_body_are_one() {
         let (all, surfaces) = collect(&[interior(None, 1.31, 1); 2]);
-        assert_eq!((surfaces[0].hidden_by, surfaces[1].hidden_by), (2, 1));
-        assert_eq!(all.unwrap().filling(3), 3);
+        let (all, ice) = (all.unwrap(), surfaces[1]);
+        assert_eq!(all.all.len(), 1);
+        let one = all.entered(0, 0);
+        let two = all.entered(0, one);
+        assert!(!ice.passes(0, false) && ice.passes(one, false));
+        assert!(ice.passes(two, true) && !ice.passes(one, true));
+        assert_eq!(
+            (all.left(0, two), all.left(0, one), all.left(0, 0)),
+            (one, 0, 0)
+        );
+        assert_eq!((all.ior(two), all.without(0, two)), (1.31, 0));
     }
 
     #[test]
-    fn too_many() {
-        let many: Vec<Interior> = (0..100).map(|i| interior(Some(i % 64), 1.0, 0)).collect();
-        let (all, surfaces) = collect(&many);
-        assert_eq!(all.unwrap().all.len(), 64);
-        assert_eq!(surfaces[3].interior, surfaces[67].interior);
-        let many: Vec<Interior> = (0..100).map(|i| interior(Some(i), 1.0, 0)).collect();
-        assert_eq!(collect(&many).0.err(), Some(100));
+    fn counters_do_not_run_over() {
+        for count in [1, 8, 9, 20, 33, 64] {
+            let many: Vec<Interior> = (0..count).map(|i| interior(Some(i), 1.0, 0)).collect();
+            let all = collect(&many).0.unwrap();
+            let mut inside = 0;
+            for _ in 0..300 {
+                inside = all.entered(count - 1, inside);
+            }
+            assert_eq!(inside, all.filled_by(count - 1));
+            for _ in 0..300 {
+                inside = all.left(count - 1, inside);
+            }
+            assert_eq!(inside, 0);
+        }
+        let many: Vec<Interior> = (0..65).map(|i| interior(Some(i), 1.0, 0)).collect();
+        assert_eq!(collect(&many).0.err(), Some(65));
     }
 }

@@ -14,25 +14,39 @@ pub use view::{Counters, View};
 use crate::plugin::{ForeignBsdf, ForeignMedium};
 
 /// What stands behind a shape.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Surface {
     /// Index of its material; none absorbs everything.
     pub material: Option<u32>,
     /// Index of the light it is, if it emits.
     pub light: Option<u32>,
-    /// What is inside, as a bit of the sets that say where a point is.
+    /// What is inside: the number of a counter in the sets that say where a point is.
     pub interior: Option<u32>,
     /// Light passes as if it were not there.
     pub null: bool,
-    /// Bits of the interiors within which it is not there.
+    /// Counters of the interiors within which it is not there.
     pub hidden_by: u64,
+    /// The counter of its own body if that refracts, else 0: within another part of the body it is not there.
+    pub body: u64,
 }
 
 impl Surface {
-    /// True if a ray that is inside of `inside` passes as if it were not there.
+    /// False if rays never pass it.
     #[inline(always)]
-    pub(crate) fn passes(&self, inside: u64) -> bool {
-        self.null || self.hidden_by & inside != 0
+    pub(crate) fn may_pass(&self) -> bool {
+        self.null || self.hidden_by | self.body != 0
+    }
+
+    /// True if a ray inside of `inside` passes as if the surface were not there; `leaving` says that it comes from its inner side.
+    #[inline(always)]
+    pub(crate) fn passes(&self, inside: u64, leaving: bool) -> bool {
+        // On the way out, one count is that of the part which is left.
+        let own = if leaving {
+            self.body & self.body.wrapping_neg()
+        } else {
+            0
+        };
+        self.null || self.hidden_by & inside != 0 || self.body & inside > own
     }
 }
 
@@ -52,6 +66,6 @@ pub struct PlacedMedium {
     pub medium: ForeignMedium,
     /// Stands free, bounded by itself; otherwise it fills shapes.
     pub free: bool,
-    /// Bits of the interiors that it fills.
+    /// Counters of the interiors that it fills.
     pub interiors: u64,
 }

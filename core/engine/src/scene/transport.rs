@@ -42,8 +42,8 @@ impl Scene {
     #[inline(always)]
     fn cross(&self, shape: u32, ng: Vec3, d: Vec3, inside: u64) -> u64 {
         match self.surface(shape).interior {
-            Some(m) if ng.dot(d) < 0.0 => inside | 1 << m,
-            Some(m) => inside & !(1 << m),
+            Some(i) if ng.dot(d) < 0.0 => self.interiors.entered(i, inside),
+            Some(i) => self.interiors.left(i, inside),
             None => inside,
         }
     }
@@ -52,8 +52,10 @@ impl Scene {
     /// itself aside.
     #[inline(always)]
     fn outside_ior(&self, surface: &Surface, inside: u64) -> f32 {
-        let own = surface.interior.map_or(0, |i| 1 << i);
-        self.interiors.ior(inside & !own)
+        let others = surface
+            .interior
+            .map_or(inside, |i| self.interiors.without(i, inside));
+        self.interiors.ior(others)
     }
 
     /// The interiors at a point: the boundaries a ray from there leaves without having entered.
@@ -70,13 +72,13 @@ impl Scene {
                 break;
             };
             let at = accel.interaction(&hit, &ray);
-            if let Some(m) = self.surface(hit.shape).interior {
+            if let Some(i) = self.surface(hit.shape).interior {
                 if at.ng.dot(ray.d) < 0.0 {
-                    entered |= 1 << m;
-                } else if entered >> m & 1 == 0 {
-                    inside |= 1 << m;
+                    entered = self.interiors.entered(i, entered);
+                } else if self.interiors.has(i, entered) {
+                    entered = self.interiors.left(i, entered);
                 } else {
-                    entered &= !(1 << m);
+                    inside = self.interiors.entered(i, inside);
                 }
             }
             ray = at.spawn(ray.d);
@@ -207,7 +209,8 @@ impl View<'_> {
             edge.length += hit.t;
             let at = self.scene.accel.as_ref().map(|a| a.interaction(&hit, &ray));
             let Some(at) = at else { return Ok(false) };
-            if !self.scene.surface(hit.shape).passes(inside) {
+            let surface = self.scene.surface(hit.shape);
+            if !surface.passes(inside, at.ng.dot(d) >= 0.0) {
                 next.inside = inside;
                 return self.surface_vertex(&at, d, next);
             }
@@ -415,14 +418,22 @@ impl View<'_> {
         let finite = ray.t_max.is_finite();
         let mut u = *u;
         for boundary in 0..MAX_BOUNDARIES {
-            let hit = accel.closest(&ray);
-            if let Some(h) = &hit
-                && !self.scene.surface(h.shape).passes(inside)
-            {
-                return Ok(false);
-            }
+            let hit = match accel.closest(&ray) {
+                None => None,
+                Some(h) => {
+                    let surface = self.scene.surface(h.shape);
+                    if !surface.may_pass() {
+                        return Ok(false);
+                    }
+                    let at = accel.interaction(&h, &ray);
+                    if !surface.passes(inside, at.ng.dot(ray.d) >= 0.0) {
+                        return Ok(false);
+                    }
+                    Some((h, at))
+                }
+            };
             let (mut segment, length) = unit_segment(&ray);
-            if let Some(h) = &hit {
+            if let Some((h, _)) = &hit {
                 segment.t1 = h.t * length;
             }
             if segment.t1 > 0.0 {
@@ -435,8 +446,9 @@ impl View<'_> {
                 edge.media |= u32::from(met);
             }
             edge.length += segment.t1;
-            let Some(h) = hit else { return Ok(true) };
-            let at = accel.interaction(&h, &ray);
+            let Some((h, at)) = hit else {
+                return Ok(true);
+            };
             inside = self.scene.cross(h.shape, at.ng, ray.d, inside);
             let o = at.offset(ray.d);
             ray = if finite {
