@@ -1,8 +1,10 @@
-//! BSDF plugins through the whole renderer: furnaces, glass in an enclosure, stacks of plates.
+//! BSDF plugins through the whole renderer: furnaces, glass in an enclosure, stacks of plates, all
+//! integrators in one room.
 
-use crate::harness::{self, Measured, Precision, each};
+use crate::harness::{self, EDGE, Measured, Precision, each};
 use crate::judge::Table;
 use crate::scenes;
+use resolvent_tests::Moments;
 use serde_json::{Value, json};
 
 struct Case {
@@ -261,6 +263,92 @@ fn an_index_matched_boundary() {
     ] {
         let m = harness::measure(&of(Some(material)), name, &precision);
         out.same(name, &m, &plain);
+    }
+    out.assert();
+}
+
+/// A closed room of rough and layered materials, with glass and a body half of glass.
+fn room(integrator: &str) -> Value {
+    let mut scene = scenes::scene([0.0, 1.2, 4.6], [0.0, -0.07, -1.0]);
+    scene["camera"] = scenes::camera([0.0, 1.2, 4.6], [0.0, -0.07, -1.0], 42.0);
+    scene["integrator"] = json!({ "plugin": integrator });
+    scene["materials"] = json!({
+        "wall": { "plugin": "diffuse", "params": { "reflectance": 0.7 } },
+        "floor": { "plugin": "principled", "params": {
+            "base_color": [0.5, 0.3, 0.2], "clearcoat": 0.7, "clearcoat_roughness": 0.4 } },
+        "left": { "plugin": "principled", "params": {
+            "base_color": [0.2, 0.2, 0.6], "roughness": 0.8, "sheen": 1, "sheen_roughness": 0.6 } },
+        "right": { "plugin": "conductor", "params": {
+            "metal": "Au", "roughness": 0.6, "anisotropy": 0.5 } },
+        "glass": { "plugin": "rough-dielectric", "params": { "ior": 1.5, "roughness": 0.6 } },
+        "half": { "plugin": "mix", "params": {
+            "a": { "plugin": "principled", "params": {
+                "base_color": [0.9, 0.6, 0.8], "transmission": 0.6, "ior": 1.4 } },
+            "b": { "plugin": "diffuse", "params": { "reflectance": 0.5 } },
+            "weight": 0.2 } },
+    });
+    let wall = |corner: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str| json!({ "type": "rectangle", "corner": corner, "edge_u": u, "edge_v": v, "material": material });
+    let ball = |x: f64, z: f64, material: &str| json!({ "type": "sphere", "center": [x, 0.6, z], "radius": 0.6, "material": material });
+    scene["shapes"] = json!([
+        wall([-2.0, 0.0, 2.0], [4.0, 0.0, 0.0], [0.0, 0.0, -4.0], "floor"),
+        wall([-2.0, 2.5, -2.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0], "wall"),
+        wall([-2.0, 0.0, -2.0], [4.0, 0.0, 0.0], [0.0, 2.5, 0.0], "wall"),
+        wall([-2.0, 0.0, 2.0], [0.0, 0.0, -4.0], [0.0, 2.5, 0.0], "left"),
+        wall([2.0, 0.0, -2.0], [0.0, 0.0, 4.0], [0.0, 2.5, 0.0], "right"),
+        ball(-0.75, -0.2, "glass"),
+        ball(0.75, 0.3, "half"),
+    ]);
+    let light = json!({
+        "type": "rectangle", "corner": [-0.7, 2.45, -0.5], "edge_u": [1.4, 0, 0], "edge_v": [0, 0, 1.2],
+        "radiance": [12, 11, 8]
+    });
+    scenes::add(&mut scene, "lights", light);
+    scene
+}
+
+/// Means of four strips of a picture over independent renderings.
+fn strips(integrator: &str) -> [Measured; 4] {
+    const RENDERINGS: u64 = 40;
+    const SAMPLES: u32 = 8;
+    let ready = harness::build(&room(integrator)).unwrap_or_else(|e| panic!("{e}"));
+    let mut moments = [[Moments::default(); 3]; 4];
+    for k in 0..RENDERINGS {
+        let rendered = ready.render(harness::hash(integrator) ^ k, 0, SAMPLES);
+        let pixels = (EDGE * EDGE) as usize;
+        let mut sums = [[0.0; 3]; 4];
+        for i in 0..pixels {
+            let sum = &mut sums[4 * i / pixels];
+            let mean = rendered.film.estimate(i).mean;
+            sum.iter_mut().zip(mean).for_each(|(s, m)| *s += m);
+        }
+        for (moments, sum) in moments.iter_mut().zip(sums) {
+            for (m, s) in moments.iter_mut().zip(sum) {
+                m.add(s * 4.0 / pixels as f64);
+            }
+        }
+    }
+    moments.map(|m| Measured {
+        mean: m.map(|m| m.mean()),
+        error: m.map(|m| m.standard_error()),
+        samples: RENDERINGS as f64 * f64::from(SAMPLES * EDGE * EDGE),
+        ..Measured::default()
+    })
+}
+
+/// Paths from the sensor, from the lights and from both ends carry the same light: values and densities of every lobe hold in
+/// both modes, and the corrections for refraction are each other's.
+#[test]
+fn integrators_agree() {
+    let mut out = Table::new("integrators_agree");
+    let [walks, both, light] = ["pt", "bdpt", "light"].map(strips);
+    for (i, pt) in walks.iter().enumerate() {
+        for (name, other) in [("bdpt", &both[i]), ("light", &light[i])] {
+            out.same(&format!("{name} and pt, strip {i}"), other, pt);
+            let worst = other.error[1].hypot(pt.error[1]) / pt.mean[1];
+            out.claim(worst < 0.015, || {
+                format!("{name}, strip {i}: too noisy to tell, {worst}")
+            });
+        }
     }
     out.assert();
 }

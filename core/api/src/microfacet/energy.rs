@@ -10,6 +10,7 @@
 use super::fresnel;
 use super::ggx::{Ggx, reflect};
 use crate::math::Vec3;
+use std::sync::OnceLock;
 
 /// Nodes in √μ from 0 to 1.
 pub const MU_NODES: usize = 24;
@@ -152,8 +153,17 @@ fn sheet(s: usize, mu: f32, alpha: f32) -> f32 {
 
 /// 2 ∫ E μ dμ = 4 ∫ E t³ dt over t = √μ of what [`sheet`] interpolates: the nodes with the integrals of their hat functions.
 fn sheet_average(s: usize, alpha: f32) -> f32 {
+    static ROWS: OnceLock<Vec<f32>> = OnceLock::new();
+    let rows = ROWS.get_or_init(|| {
+        let row = |i: usize| {
+            (0..MU_NODES).map(move |m| at(i / ALPHA_NODES, i % ALPHA_NODES, m) * HATS[m])
+        };
+        (0..TABLE.len() / (2 * MU_NODES))
+            .map(|i| row(i).sum())
+            .collect()
+    });
     let (a, fa) = node(alpha.sqrt(), ALPHA_NODES);
-    let row = |a: usize| (0..MU_NODES).map(|m| at(s, a, m) * HATS[m]).sum::<f32>();
+    let row = |a: usize| rows[s * ALPHA_NODES + a];
     row(a) * (1.0 - fa) + row(a + 1) * fa
 }
 
