@@ -106,6 +106,7 @@ fn light(l: &Light) -> &'static str {
         Light::Environment(Environment::Image { .. }) => "environment image",
         Light::Distant { .. } => "distant",
         Light::Point { .. } => "point",
+        Light::Spot { .. } => "spot",
         Light::Rectangle { .. } => "rectangle",
     }
 }

@@ -288,6 +288,20 @@ pub enum Light {
         /// Radiant intensity, W·sr⁻¹, ≥ 0.
         intensity: Vec3,
     },
+    /// Light from a point into a cone. The intensity falls from that within the inner cone to 0 at the outer one as the smoothstep
+    /// s²(3 − 2s) of s = (cos θ − cos θ_outer)/(cos θ_inner − cos θ_outer).
+    Spot {
+        /// Where it is.
+        position: Vec3,
+        /// The axis along which it shines; need not be of length 1.
+        direction: Vec3,
+        /// Radiant intensity within the inner cone, W·sr⁻¹, ≥ 0.
+        intensity: Vec3,
+        /// Full angle of the outer cone, degrees, in (0, 360].
+        angle_deg: f64,
+        /// Full angle of the inner cone, degrees, from 0 to `angle_deg`.
+        inner_angle_deg: f64,
+    },
     /// A parallelogram that emits from the side where edge_u × edge_v points.
     Rectangle {
         /// One corner.

@@ -219,6 +219,7 @@ pub(crate) static SCENE: Object = Object {
                 &ENVIRONMENT,
                 &DISTANT,
                 &POINT,
+                &SPOT,
                 &RECTANGLE_LIGHT,
             ])),
             "Lights",
@@ -483,6 +484,31 @@ static POINT: Object = Object {
             "intensity",
             Kind::Spectrum,
             "Radiant intensity, W/sr: one number or RGB",
+        ),
+    ],
+    rules: &[],
+};
+
+static SPOT: Object = Object {
+    name: "spot",
+    help: "Light from a point into a cone",
+    fields: &[
+        need("position", Kind::Vec3, "Where it is"),
+        need("direction", Kind::Vec3, "The axis along which it shines"),
+        need(
+            "intensity",
+            Kind::Spectrum,
+            "Radiant intensity within the inner cone, W/sr: one number or RGB",
+        ),
+        need(
+            "angle_deg",
+            Kind::Number(Range::above(0.0, 360.0)),
+            "Full angle of the cone in degrees",
+        ),
+        may(
+            "inner_angle_deg",
+            Kind::Number(Range::closed(0.0, 360.0)),
+            "Full angle of the cone of full intensity, from which it falls to 0 as a smoothstep of the cosine (angle_deg)",
         ),
     ],
     rules: &[],

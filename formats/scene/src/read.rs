@@ -315,6 +315,25 @@ impl Reader<'_> {
                 position: vec3(node, "position")?,
                 intensity: spectrum(node, "intensity")?,
             },
+            "spot" => {
+                let angle_deg = number(node, "angle_deg")?;
+                let inner_angle_deg = number(node, "inner_angle_deg").unwrap_or(angle_deg);
+                if inner_angle_deg > angle_deg {
+                    self.checker.report(
+                        node.get("inner_angle_deg")?,
+                        format!(
+                            "expected at most angle_deg ({angle_deg}), found {inner_angle_deg}"
+                        ),
+                    );
+                }
+                Light::Spot {
+                    position: vec3(node, "position")?,
+                    direction: self.direction(node, "direction")?,
+                    intensity: spectrum(node, "intensity")?,
+                    angle_deg,
+                    inner_angle_deg,
+                }
+            }
             "rectangle" => {
                 let [corner, edge_u, edge_v] = self.rectangle(node)?;
                 Light::Rectangle {

@@ -248,6 +248,17 @@ fn light(l: &Light) -> Json {
         } => {
             json!({"type": "point", "position": position, "intensity": spectrum(*intensity)})
         }
+        Light::Spot {
+            position,
+            direction,
+            intensity,
+            angle_deg,
+            inner_angle_deg,
+        } => json!({
+            "type": "spot", "position": position, "direction": direction,
+            "intensity": spectrum(*intensity), "angle_deg": angle_deg,
+            "inner_angle_deg": inner_angle_deg,
+        }),
         Light::Rectangle {
             corner,
             edge_u,

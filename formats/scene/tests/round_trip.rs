@@ -50,7 +50,17 @@ fn every_key_arrives() {
     );
     assert_eq!(s.integrator, PluginBlock::new("pt").with("max_depth", 12.0));
 
-    assert_eq!(s.lights.len(), 5);
+    assert_eq!(s.lights.len(), 6);
+    assert_eq!(
+        s.lights[5],
+        Light::Spot {
+            position: [1.0, 6.0, 0.0],
+            direction: [0.0, -2.0, 0.0],
+            intensity: [9.0, 8.0, 7.0],
+            angle_deg: 50.0,
+            inner_angle_deg: 20.0
+        }
+    );
     let Light::Environment(Environment::Image {
         file,
         scale,

@@ -41,10 +41,15 @@ impl Distribution {
 
     /// Chooses by `u` in [0, 1); also returns what is left of `u`, uniform in [0, 1) again. `None` if all weights are zero.
     pub fn sample(&self, u: f32) -> Option<(usize, f32)> {
+        let (i, rest) = self.sample_wide(f64::from(u))?;
+        Some((i, (rest as f32).min(1.0f32.next_down())))
+    }
+
+    /// [`Distribution::sample`] in double precision, for what is left to choose from again.
+    pub fn sample_wide(&self, u: f64) -> Option<(usize, f64)> {
         if !(self.total > 0.0) {
             return None;
         }
-        let u = f64::from(u);
         // The first entry above u has a positive weight before it.
         let i = self
             .cumulative
@@ -52,8 +57,8 @@ impl Distribution {
             .clamp(1, self.cumulative.len() - 1)
             - 1;
         let width = self.cumulative[i + 1] - self.cumulative[i];
-        let rest = ((u - self.cumulative[i]) / width) as f32;
-        Some((i, rest.clamp(0.0, 1.0f32.next_down())))
+        let rest = (u - self.cumulative[i]) / width;
+        Some((i, rest.clamp(0.0, 1.0f64.next_down())))
     }
 }
 

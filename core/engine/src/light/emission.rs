@@ -97,6 +97,20 @@ impl Lights {
                 let weight = *intensity / (probability * warp::SPHERE_PDF);
                 Some(ray(*p, d, probability, warp::SPHERE_PDF, weight))
             }
+            Light::Spot(spot) => {
+                let d = spot.direction(direction);
+                let intensity = spot.towards(d);
+                let density = spot.direction_density(d);
+                if !(density > 0.0) || intensity.is_zero() {
+                    return None;
+                }
+                vertex.flags = vertex_flags::DELTA;
+                vertex.p = spot.position.into();
+                vertex.wo = d.into();
+                vertex.emitted = intensity;
+                let weight = intensity / (probability * density);
+                Some(ray(spot.position, d, probability, density, weight))
+            }
             Light::Distant {
                 to_light,
                 irradiance,
@@ -111,7 +125,7 @@ impl Lights {
             infinite => {
                 let wi = Vec3::from(infinite.sample(Vec3::ZERO, direction)?.wi);
                 // One technique for all of them together.
-                let (radiance, per_direction) = self.environment(false, wi);
+                let (radiance, per_direction) = self.mixture(self.chooser(false), wi);
                 if !(per_direction > 0.0) || radiance.is_zero() {
                     return None;
                 }
@@ -134,7 +148,7 @@ impl Lights {
             let position = if light.flags & vertex_flags::DELTA != 0 {
                 chooser.probability(light.light)
             } else {
-                self.environment(false, light.position()).1
+                self.mixture(chooser, light.position()).1
             };
             return [position, self.bounds.section_density()];
         }
@@ -154,6 +168,10 @@ impl Lights {
                 [probability / area.area, density]
             }
             Light::Point { .. } => [probability, warp::SPHERE_PDF],
+            Light::Spot(spot) => {
+                let d = (to.position() - spot.position).normalize_or_zero();
+                [probability, spot.direction_density(d)]
+            }
             _ => [0.0; 2],
         }
     }
@@ -173,8 +191,8 @@ fn ray(o: Vec3, d: Vec3, position: f32, direction: f32, weight: Spectrum) -> Lig
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Quad, Sphere};
-    use crate::light::Area;
+    use crate::geometry::{Cylinder, Disk, Quad, Sphere};
+    use crate::light::{Area, Spot};
     use resolvent_api::rng::Stream;
     use std::f32::consts::PI;
 
@@ -189,6 +207,16 @@ mod tests {
             radius: 0.3,
         };
         let to_light = Vec3::new(0.3, 0.5, 0.8).normalize();
+        let disk = Disk {
+            center: Vec3::new(0.1, 0.6, 0.3),
+            normal: to_light,
+            radius: 0.4,
+        };
+        let cylinder = Cylinder {
+            base: Vec3::new(0.2, -0.6, 0.1),
+            axis: Vec3::new(0.1, 0.2, 0.7),
+            radius: 0.15,
+        };
         let all = vec![
             Light::Area(Area::quad(0, quad, Spectrum::splat(2.0), true)),
             Light::Area(Area::sphere(1, sphere, Spectrum::splat(1.0), false)),
@@ -204,6 +232,15 @@ mod tests {
                 radiance: Spectrum::splat(0.3),
             },
             Light::disc(-to_light, Spectrum::splat(0.8), 20.0),
+            Light::Spot(Spot::new(
+                Vec3::new(0.3, -0.4, 0.5),
+                -to_light,
+                Spectrum::splat(4.0),
+                70.0,
+                20.0,
+            )),
+            Light::Area(Area::disk(2, disk, Spectrum::splat(1.2), false)),
+            Light::Area(Area::cylinder(3, cylinder, Spectrum::splat(0.7), true)),
         ];
         let bounds = BoundingSphere {
             center: Vec3::new(0.1, 0.0, 0.0),
@@ -217,7 +254,7 @@ mod tests {
     fn rays_carry_the_power_of_their_light() {
         let lights = lights();
         let mut s = Stream::new(3);
-        let mut sums = [[0f64; 2]; 6];
+        let mut sums = [[0f64; 2]; 9];
         let n = 400_000;
         let mut v = Vertex::empty();
         for _ in 0..n {
@@ -242,10 +279,9 @@ mod tests {
             sums[i][1] += f64::from(r.weight[0]).powi(2);
         }
         let power = |i: usize| f64::from(lights.all[i].power(1.5, 3));
-        for (i, expected) in [power(0), power(1), power(2), power(3), power(4) + power(5)]
-            .into_iter()
-            .enumerate()
-        {
+        // The mixture's power stands with its first light.
+        for i in [0, 1, 2, 3, 4, 6, 7, 8] {
+            let expected = power(i) + if i == 4 { power(5) } else { 0.0 };
             let mean = sums[i][0] / f64::from(n);
             let error = ((sums[i][1] / f64::from(n) - mean * mean) / f64::from(n)).sqrt();
             assert!(

@@ -4,16 +4,21 @@
 //! the density of all of them, so a sun in front of a sky needs no special case.
 
 mod area;
+mod bound;
 mod distribution;
 mod emission;
 mod image;
 mod select;
+mod spot;
+mod tree;
 
 pub use area::{Area, AreaPoint, AreaShape};
 pub use distribution::Distribution;
 pub use emission::BoundingSphere;
 pub use image::ImageEnvironment;
-pub use select::{Chooser, Lights};
+pub use select::{Chooser, Lights, Reference, TREE_FROM};
+pub use spot::Spot;
+pub use tree::Tree;
 
 use crate::geometry::SurfacePoint;
 use resolvent_api::Spectrum;
@@ -53,6 +58,8 @@ pub enum Light {
         /// W·sr⁻¹.
         intensity: Spectrum,
     },
+    /// A point that shines into a cone.
+    Spot(Spot),
     /// An emitting shape.
     Area(Area),
 }
@@ -73,6 +80,30 @@ fn at_infinity(wi: Vec3, radiance: Spectrum, density: f32, flags: u32) -> LightS
     }
 }
 
+/// A point light seen from `from`, with its intensity in a direction away from it; `None` if it shows nothing there.
+fn at_point(
+    position: Vec3,
+    from: Vec3,
+    intensity: impl FnOnce(Vec3) -> Spectrum,
+) -> Option<LightSample> {
+    let d = position - from;
+    let d2 = d.length_squared();
+    if !(d2 > 0.0) {
+        return None;
+    }
+    let distance = d2.sqrt();
+    let wi = d / distance;
+    let intensity = intensity(-wi);
+    if intensity.is_zero() {
+        return None;
+    }
+    let mut s = at_infinity(wi, intensity / d2, 1.0, vertex_flags::DELTA);
+    s.flags &= !vertex_flags::INFINITE;
+    s.p = position.into();
+    s.distance = distance;
+    Some(s)
+}
+
 impl Light {
     /// A disc at infinity that gives `irradiance` (W·m⁻²) on a plane facing its centre, with the full angle `angle_deg`.
     pub fn disc(to_light: Vec3, irradiance: Spectrum, angle_deg: f64) -> Self {
@@ -89,7 +120,10 @@ impl Light {
 
     /// True if a scattered ray can meet it.
     pub fn is_hittable(&self) -> bool {
-        !matches!(self, Self::Distant { .. } | Self::Point { .. })
+        !matches!(
+            self,
+            Self::Distant { .. } | Self::Point { .. } | Self::Spot(_)
+        )
     }
 
     /// True if it is met by rays that leave the scene.
@@ -136,23 +170,8 @@ impl Light {
             Self::Point {
                 position,
                 intensity,
-            } => {
-                let d = *position - from;
-                let d2 = d.length_squared();
-                if !(d2 > 0.0) {
-                    return None;
-                }
-                let distance = d2.sqrt();
-                Some(LightSample {
-                    p: (*position).into(),
-                    distance,
-                    ..at_infinity(d / distance, *intensity / d2, 1.0, vertex_flags::DELTA)
-                })
-                .map(|mut s| {
-                    s.flags &= !vertex_flags::INFINITE;
-                    s
-                })
-            }
+            } => at_point(*position, from, |_| *intensity),
+            Self::Spot(spot) => at_point(spot.position, from, |w| spot.towards(w)),
             Self::Area(area) => area.sample(from, u),
         }
     }
@@ -192,6 +211,7 @@ impl Light {
                 ..
             } => 2.0 * PI * one_minus_cos * section * radiance.mean(lanes),
             Self::Point { intensity, .. } => 4.0 * PI * intensity.mean(lanes),
+            Self::Spot(spot) => spot.solid_angle() * spot.intensity.mean(lanes),
             Self::Area(area) => area.power(lanes),
         }
     }

@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
-use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights};
+use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights, Spot};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
 use glam::DVec3;
 use resolvent_api::abi::scene_traits;
@@ -438,6 +438,12 @@ fn shapes_bounds(geometry: &Geometry, mut bounds: Aabb) -> Aabb {
     bounds
 }
 
+/// A direction of any length, scaled before it is squared.
+fn unit(v: [f64; 3]) -> Vec3 {
+    let v = DVec3::from(v);
+    (v / v.abs().max_element()).normalize().as_vec3()
+}
+
 /// Lights that are no surfaces; black ones are left out.
 fn distant_light(
     scene: &describe::Scene,
@@ -480,7 +486,7 @@ fn distant_light(
             irradiance,
             angle_deg,
         } => {
-            let to_light = DVec3::from(*to_light).normalize().as_vec3();
+            let to_light = unit(*to_light);
             let irradiance_rgb = spectrum(*irradiance);
             (!black(irradiance)).then(|| {
                 if *angle_deg > 0.0 {
@@ -499,6 +505,21 @@ fn distant_light(
         } => (!black(intensity)).then(|| Light::Point {
             position: (DVec3::from(*position) - centre).as_vec3(),
             intensity: spectrum(*intensity),
+        }),
+        describe::Light::Spot {
+            position,
+            direction,
+            intensity,
+            angle_deg,
+            inner_angle_deg,
+        } => (!black(intensity)).then(|| {
+            Light::Spot(Spot::new(
+                (DVec3::from(*position) - centre).as_vec3(),
+                unit(*direction),
+                spectrum(*intensity),
+                *angle_deg,
+                *inner_angle_deg,
+            ))
         }),
         describe::Light::Rectangle { .. } => None,
     })

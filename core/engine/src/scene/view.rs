@@ -1,12 +1,13 @@
 //! The scene as an integrator sees it: the table of functions, counters, and the first error.
 
 use super::{Scene, media};
+use crate::light::Reference;
 use crate::plugin::{ForeignMedium, pending_failure};
 use resolvent_api::abi::{SceneTable, Status, Text, scene_traits};
 use resolvent_api::math::Float3;
 use resolvent_api::operator::FlightDraws;
 use resolvent_api::vertex::{
-    CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex, VertexKind, vertex_flags,
+    CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex, vertex_flags,
 };
 use resolvent_api::{Spectrum, Vec3};
 use std::cell::{Cell, RefCell};
@@ -237,12 +238,8 @@ unsafe extern "C" fn sample_light(
 ) -> Status {
     // SAFETY: as above.
     let (v, reference, point) = unsafe { (view(ctx), &*reference, *point) };
-    let in_medium = reference.is(VertexKind::Medium);
-    match v
-        .scene
-        .lights
-        .sample(in_medium, reference.position(), choice, point)
-    {
+    let at = Reference::of(reference);
+    match v.scene.lights.sample(&at, choice, point) {
         Some(s) if s.density > 0.0 && !s.radiance.is_zero() => {
             // SAFETY: as above.
             unsafe { *out = s };
@@ -259,22 +256,16 @@ unsafe extern "C" fn light_density(
 ) -> f32 {
     // SAFETY: as above.
     let (v, reference, found) = unsafe { (view(ctx), &*reference, &*found) };
-    let in_medium = reference.is(VertexKind::Medium);
+    let at = Reference::of(reference);
     let lights = &v.scene.lights;
     if found.flags & vertex_flags::DELTA != 0 {
-        return lights.chooser(in_medium).probability(found.light);
+        return lights.probability(&at, found.light);
     }
     if found.flags & vertex_flags::INFINITE != 0 {
-        return lights.environment(in_medium, found.position()).1;
+        return lights.environment(at.in_medium, found.position()).1;
     }
     let ng = Vec3::from(found.ng);
-    lights.density(
-        in_medium,
-        found.light,
-        reference.position(),
-        found.position(),
-        ng,
-    )
+    lights.density(&at, found.light, found.position(), ng)
 }
 
 unsafe extern "C" fn approximate(
