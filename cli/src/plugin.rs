@@ -71,7 +71,7 @@ fn list(registry: &Registry, json: bool) -> Outcome {
     for (kind, name, plugin) in &all {
         if let Ok(p) = plugin {
             println!(
-                "{:<11} {name:<14} {:<8} {}",
+                "{:<11} {name:<17} {:<8} {}",
                 kind.name(),
                 p.decl.version,
                 p.decl.summary

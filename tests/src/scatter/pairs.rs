@@ -1,7 +1,8 @@
 //! What must hold for every pair of directions.
 
-use super::directions;
+use super::{directions, draws};
 use crate::Suite;
+use resolvent_api::rng::Stream;
 use resolvent_api::{Mode, Scatter, Vec3};
 
 /// Reciprocity, f(wo, wi) = η² f(wi, wo) with the index of the side of `wi` over that of `wo` (see [`Mode`]), and that the reverse density is the forward density of the swapped pair.
@@ -42,5 +43,16 @@ pub fn modes(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3) {
             k.eval(wo, wi, Mode::Importance),
         );
         suite.claim(a == b, || format!("{name}: modes differ at wi = {wi}"));
+    }
+    let mut stream = Stream::new(0x5a3d);
+    for _ in 0..100 {
+        let u = draws(&mut stream);
+        let (a, b) = (
+            k.sample(wo, u, Mode::Radiance),
+            k.sample(wo, u, Mode::Importance),
+        );
+        suite.claim(a == b, || {
+            format!("{name}: samples differ between modes, {a:?} {b:?}")
+        });
     }
 }

@@ -223,6 +223,51 @@ fn smooth_glass() {
     }
 }
 
+/// A path that is walked backwards has the densities that were stated for it, also where lobes are single directions.
+#[test]
+fn delta_lobes_backwards() {
+    let mut suite = Suite::new();
+    for params in [
+        r#"{ "transmission": 0.6, "roughness": 0, "metallic": 0.3, "base_color": [0.9, 0.5, 0.2] }"#,
+        r#"{ "transmission": 0.6, "roughness": 0, "clearcoat": 0.7, "sheen": 0.5 }"#,
+        r#"{ "transmission": 1, "roughness": 0, "thin": true, "clearcoat": 0.4 }"#,
+        r#"{ "roughness": 0.4, "anisotropy": 0.5, "clearcoat": 1 }"#,
+    ] {
+        let k = surface(params);
+        for wo in directions(40, 0xde1) {
+            for lobe in [0.02, 0.2, 0.5, 0.8, 0.97] {
+                let there = k.sample(wo, draw(lobe), Mode::Radiance);
+                let Some(s) = there.filter(|s| s.measure == Measure::Discrete as u32) else {
+                    continue;
+                };
+                let wi = Vec3::from(s.wi);
+                if wi.z.abs() < 0.05 {
+                    continue;
+                }
+                let back = (0..400).find_map(|i| {
+                    let b = k.sample(wi, draw((i as f32 + 0.5) / 400.0), Mode::Radiance)?;
+                    let same = b.lobe == s.lobe
+                        && b.measure == s.measure
+                        && (Vec3::from(b.wi) - wo).length() < 1e-4;
+                    same.then_some(b)
+                });
+                let Some(b) = back else {
+                    // Too unlikely to be met by 400 draws.
+                    suite.claim(s.reverse < 0.01, || {
+                        format!("{params}: {s:?} has no way back")
+                    });
+                    continue;
+                };
+                let what = format!("{params} at {wo}");
+                suite.close(&what, s.reverse.into(), b.forward.into(), 1e-3, 1e-5);
+                suite.close(&what, s.forward.into(), b.reverse.into(), 1e-3, 1e-5);
+                suite.close(&what, (s.eta * b.eta).into(), 1.0, 1e-5, 0.0);
+            }
+        }
+    }
+    suite.assert();
+}
+
 /// A coat's mirrored share is Fresnel's; f0, specular and its colour set the boundary's at normal incidence.
 #[test]
 fn reflectances_at_normal_incidence() {
