@@ -127,6 +127,8 @@ pub enum Heuristic {
     Balance,
     /// q_s² / Σ q² (Veach 1997, eq. 9.13 with β = 2).
     Power,
+    /// 1: the strategy is the only one used.
+    Alone,
 }
 
 /// The densities of a whole path x_0 … x_n, x_0 on a light and x_n on the sensor, under all strategies: strategy s takes
@@ -222,6 +224,12 @@ impl Strategies {
         }
     }
 
+    /// The weight of strategy `s` by the balance heuristic, for lane densities as in [`Strategies::divisor`].
+    pub fn weight(&self, s: usize, track: Spectrum, lanes: u32) -> f64 {
+        self.divisor(s, track, lanes, Heuristic::Alone)
+            / self.divisor(s, track, lanes, Heuristic::Balance)
+    }
+
     /// What strategy `s` divides contribution over its own grey density by, for a path whose walks and connection have the
     /// lane densities `track` (all edges' track and all collisions' σ_t).
     pub fn divisor(&self, s: usize, track: Spectrum, lanes: u32, heuristic: Heuristic) -> f64 {
@@ -251,6 +259,7 @@ impl Strategies {
                 self.relative(s, |k, d| sum += q(k, d).powi(2));
                 if own > 0.0 { sum / own } else { f64::INFINITY }
             }
+            Heuristic::Alone => q(s, 1.0),
         }
     }
 }

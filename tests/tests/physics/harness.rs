@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 pub const EDGE: u32 = 32;
 const PIXELS: f64 = (EDGE * EDGE) as f64;
 /// Samples of a pixel that the sampler spreads evenly.
-const BATCH: u32 = 16;
+pub const BATCH: u32 = 16;
 /// Samples per pixel that estimate how many are needed.
 const PILOT: u32 = BATCH;
 /// Goals are aimed at with this margin, since the estimate has an error of its own.
@@ -138,6 +138,11 @@ pub fn build(scene: &Value) -> Result<Ready, String> {
 }
 
 impl Ready {
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// Renders samples `begin` to `end` of every pixel.
     ///
     /// # Panics

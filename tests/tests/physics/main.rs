@@ -22,3 +22,5 @@ mod stress_places;
 mod stress_world;
 mod surfaces;
 mod transmittance;
+mod strategies;
+mod weights;

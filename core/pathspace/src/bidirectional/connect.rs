@@ -29,8 +29,8 @@ pub struct Bidirectional {
     pub strategies: Strategies,
     /// How weights are made.
     pub heuristic: Heuristic,
-    /// The strategy that finds a path is the only one, and weighs 1: particle tracing, or scenes whose lights are only met.
-    pub alone: bool,
+    /// The edge of the last connection.
+    pub edge: Edge,
 }
 
 /// The densities that a connection changes: of the two vertices it joins and of their neighbours, seen across it.
@@ -53,7 +53,7 @@ impl Bidirectional {
                 ..Strategies::default()
             },
             heuristic,
-            alone: false,
+            edge: mis::clear(0.0),
         }
     }
 
@@ -66,7 +66,7 @@ impl Bidirectional {
             return Ok(Spectrum::ZERO);
         }
         let f = node.beta.f * v.emitted;
-        if t == 2 || self.alone {
+        if t == 2 || self.heuristic == Heuristic::Alone {
             return Ok(f / node.beta.p.mean(scene.lanes()));
         }
         let before = &nodes[t - 2].vertex;
@@ -238,7 +238,7 @@ impl Bidirectional {
         let importance = f64::from(sensor.target.density);
         let f = start * e.f * edge.value * (importance / d2) as f32;
         let p = ny.beta.p * mis::track(&edge);
-        let radiance = if self.alone {
+        let radiance = if self.heuristic == Heuristic::Alone {
             f / (p * mis::rho(&edge)).mean(scene.lanes())
         } else {
             let across = Across {
@@ -326,6 +326,7 @@ impl Bidirectional {
         }
         if let (Some(edge), true) = (connection, s > 0) {
             out.rho[s - 1] = mis::rho(edge);
+            self.edge = *edge;
         }
     }
 

@@ -7,7 +7,7 @@ use crate::scatter;
 use resolvent_api::integrator::Outcome;
 use resolvent_api::math::{DVec3, Vec3};
 use resolvent_api::operator::{Mode, ScatterEval};
-use resolvent_api::vertex::Edge;
+use resolvent_api::vertex::{Edge, vertex_flags};
 use resolvent_api::{SceneView, Vertex, VertexKind};
 
 /// A path x_0 … x_n from a light to the sensor, without delta events.
@@ -96,11 +96,17 @@ impl Path {
         Ok(f.map(|v| v * scale))
     }
 
-    /// The densities of all strategies.
+    /// The densities of all strategies, as a walk finds them that takes its first `s` vertices from the light: closures are
+    /// asked in the direction of the walk that was at their vertex, so that every `s` asks for forward and reverse elsewhere.
     ///
     /// # Errors
     /// If a plugin breaks.
-    pub fn densities(&self, scene: &SceneView<'_>, light_walks: f64) -> Outcome<Strategies> {
+    pub fn densities(
+        &self,
+        scene: &SceneView<'_>,
+        s: usize,
+        light_walks: f64,
+    ) -> Outcome<Strategies> {
         let n = self.edges.len();
         let mut out = Strategies {
             light_walks,
@@ -108,24 +114,50 @@ impl Path {
         };
         out.resize(n);
         let x = &self.vertices;
+        let w = |i: usize| self.direction(i);
         let [position, direction] = scene.emission_density(&x[0], &x[1])?;
         out.from_light[0] = f64::from(position);
-        out.from_light[1] = f64::from(direction) * conversion(&x[0], &x[1], self.direction(0));
-        out.chosen = f64::from(scene.light_density(&x[1], &x[0]))
-            * conversion(&x[1], &x[0], self.direction(0));
-        out.from_sensor[n - 1] =
-            self.importance * conversion(&x[n], &x[n - 1], self.direction(n - 1));
+        out.from_light[1] = f64::from(direction) * conversion(&x[0], &x[1], w(0));
+        out.chosen = f64::from(scene.light_density(&x[1], &x[0]));
+        let delta = x[0].flags & vertex_flags::DELTA != 0;
+        if !delta {
+            out.chosen *= conversion(&x[1], &x[0], w(0));
+        }
+        out.from_sensor[n - 1] = self.importance * conversion(&x[n], &x[n - 1], w(n - 1));
         for i in 1..n {
-            let along = self.turn(scene, i, Mode::Importance)?;
-            out.from_light[i + 1] =
-                f64::from(along.forward) * conversion(&x[i], &x[i + 1], self.direction(i));
-            let against = self.turn(scene, i, Mode::Radiance)?;
-            out.from_sensor[i - 1] =
-                f64::from(against.forward) * conversion(&x[i], &x[i - 1], self.direction(i - 1));
+            let (to_sensor, to_light) = if i < s {
+                let e = self.turn(scene, i, Mode::Importance)?;
+                (e.forward, e.reverse)
+            } else {
+                let e = self.turn(scene, i, Mode::Radiance)?;
+                (e.reverse, e.forward)
+            };
+            out.from_light[i + 1] = f64::from(to_sensor) * conversion(&x[i], &x[i + 1], w(i));
+            out.from_sensor[i - 1] = f64::from(to_light) * conversion(&x[i], &x[i - 1], w(i - 1));
+        }
+        if delta {
+            // Scattering never finds it.
+            out.from_sensor[0] = 0.0;
         }
         for (rho, edge) in out.rho.iter_mut().zip(&self.edges) {
             *rho = mis::rho(edge);
         }
         Ok(out)
+    }
+
+    /// The lane densities under flights of all edges and collisions.
+    pub fn track(&self) -> [f64; 4] {
+        let mut out = [1.0; 4];
+        for (lane, out) in out.iter_mut().enumerate() {
+            for e in &self.edges {
+                *out *= f64::from(mis::track(e)[lane]);
+            }
+            for v in &self.vertices {
+                if v.is(VertexKind::Medium) {
+                    *out *= f64::from(v.sigma_t[lane]);
+                }
+            }
+        }
+        out
     }
 }

@@ -22,6 +22,8 @@ pub struct Node {
     pub forward: f64,
     /// Density, per area or volume, at which the vertex after would find this one; known once that has scattered.
     pub reverse: f64,
+    /// What roulette multiplied `beta` by.
+    pub survival: f64,
     /// The walk was turned by a delta lobe here: nothing can be connected to.
     pub delta: bool,
 }
@@ -43,6 +45,7 @@ impl Node {
             beta: Throughput::ONE,
             forward: 0.0,
             reverse: 0.0,
+            survival: 1.0,
             delta: false,
         }
     }
@@ -177,6 +180,7 @@ impl Subpath {
         }
         let mut beta = self.nodes[0].beta;
         let mut density = f64::from(density);
+        let mut survival = 1.0;
         let mut direction = Vec3::from(ray.d);
         for bounce in 0u32.. {
             if self.len >= limit {
@@ -211,6 +215,7 @@ impl Subpath {
                 beta.collide::<CHROMATIC>(v.sigma_t, v.sigma_s, lanes);
             }
             node.beta = beta;
+            node.survival = survival;
             if node.vertex.is(VertexKind::Emitter) || beta.f.is_zero() || self.len >= limit {
                 break;
             }
@@ -230,6 +235,7 @@ impl Subpath {
                     break;
                 }
                 beta.f *= 1.0 / q;
+                survival /= f64::from(q);
             }
             density = forward;
             direction = wi;

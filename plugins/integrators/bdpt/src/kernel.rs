@@ -28,9 +28,13 @@ impl Kernel<'_> {
     pub fn tile<const CHROMATIC: bool>(&self, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
         let [x0, y0, x1, y1] = tile.window;
         let walks = f64::from(x1 - x0) * f64::from(y1 - y0);
-        let mut paths = Bidirectional::new(walks, self.heuristic);
         // Without lights worth connecting to (a constant sky around a cloud), scattering finds them.
-        paths.alone = !self.scene.has(scene_traits::LIGHTS);
+        let heuristic = if self.connects() {
+            self.heuristic
+        } else {
+            Heuristic::Alone
+        };
+        let mut paths = Bidirectional::new(walks, heuristic);
         for y in tile.min[1]..tile.max[1] {
             for x in tile.min[0]..tile.max[0] {
                 let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
@@ -68,7 +72,7 @@ impl Kernel<'_> {
         } else {
             paths.sensor.clear();
         }
-        if !paths.alone {
+        if self.connects() {
             // The light's own vertex, and at least one that scatters.
             let limit = limit.saturating_sub(1);
             paths
@@ -84,7 +88,7 @@ impl Kernel<'_> {
             if self.wants(0, t) {
                 sample.radiance += paths.hit(scene, t)?;
             }
-            if t < limit && self.wants(1, t) && !paths.alone {
+            if t < limit && self.wants(1, t) && self.connects() {
                 sample.radiance += paths.next_event(scene, t, draws)?;
             }
         }
@@ -130,6 +134,10 @@ impl Kernel<'_> {
             }
         }
         Ok(())
+    }
+
+    fn connects(&self) -> bool {
+        self.scene.has(scene_traits::LIGHTS)
     }
 
     fn wants(&self, s: usize, t: usize) -> bool {

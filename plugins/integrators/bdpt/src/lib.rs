@@ -8,7 +8,7 @@
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events of a path, −1: any number. A limit makes the picture darker than it should be |
 //! | `connections` | float > 0 | 8 | vertices of the light's walk that a vertex of the sensor's is joined to, on average; the picture's mean does not depend on it |
-//! | `heuristic` | `balance`, `power` | `balance` | how the strategies' densities make weights |
+//! | `heuristic` | `balance`, `power`, `alone` | `balance` | how the strategies' densities make weights; `alone`: the one strategy asked for is the only one |
 //! | `s`, `t` | int ≥ −1 | −1 | only the strategy with so many vertices from the light and from the sensor, −1: all |
 //!
 //! ```json
@@ -48,7 +48,7 @@ impl Plugin for Bidirectional {
         .build(),
         Decl::choice(
             "heuristic",
-            "balance|power",
+            "balance|power|alone",
             "how the strategies' densities make weights",
         )
         .default("\"balance\"")
@@ -73,6 +73,7 @@ impl Plugin for Bidirectional {
         let count = |name: &str| params.int(name).map(|v| usize::try_from(v).ok());
         let heuristic = match params.text("heuristic").as_deref() {
             Some("power") => Heuristic::Power,
+            Some("alone") => Heuristic::Alone,
             _ => Heuristic::Balance,
         };
         Ok(Self {

@@ -59,8 +59,7 @@ impl ParticleTracer {
         tile: &Tile,
         out: &mut Output<'_>,
     ) -> Outcome<()> {
-        let mut paths = Bidirectional::new(1.0, Heuristic::Balance);
-        paths.alone = true;
+        let mut paths = Bidirectional::new(1.0, Heuristic::Alone);
         let emits = scene.has(scene_traits::LIGHTS) || scene.has(scene_traits::HITTABLE_LIGHTS);
         // The light's own vertex, and one for each scattering.
         let limit = (self.max_depth as usize).saturating_add(1);

@@ -53,8 +53,12 @@ impl<'a> Kernel<'a> {
         let extent = [x1 - x0 + 2.0 * m, y1 - y0 + 2.0 * m];
         let area = f64::from(extent[0]) * f64::from(extent[1]);
         // Of all strategies of a length, one is tried: that which finds all pixels alike counts `area` times as much.
-        let mut paths = Bidirectional::new(area, Heuristic::Balance);
-        paths.alone = !scene.has(scene_traits::LIGHTS);
+        let heuristic = if scene.has(scene_traits::LIGHTS) {
+            Heuristic::Balance
+        } else {
+            Heuristic::Alone
+        };
+        let paths = Bidirectional::new(area, heuristic);
         Self {
             scene,
             settings,
@@ -150,7 +154,11 @@ impl<'a> Kernel<'a> {
         let probability = (1.0 - r) * r.powf(steps);
         let vertices = depth as usize + 2;
         // Where scattering alone finds lights, there is one strategy; else all with t ≥ 1.
-        let strategies = if self.paths.alone { 1 } else { vertices };
+        let strategies = if self.paths.heuristic == Heuristic::Alone {
+            1
+        } else {
+            vertices
+        };
         let s = ((strategy * strategies as f32) as usize).min(strategies - 1);
         let found = self.strategy::<CHROMATIC>(s, vertices - s)?;
         let scale = (strategies as f64 / probability) as f32;
