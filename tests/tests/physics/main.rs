@@ -7,6 +7,7 @@
 //! Some tables run a stated part of their rows by default and all of them with `RESOLVENT_FULL=1` in the environment.
 //! Figures are printed with `--nocapture`.
 
+mod agreement;
 mod harness;
 mod judge;
 mod scenes;
@@ -17,10 +18,10 @@ mod nested;
 mod points;
 mod slab_flux;
 mod slab_radiance;
+mod strategies;
 mod stress_media;
 mod stress_places;
 mod stress_world;
 mod surfaces;
 mod transmittance;
-mod strategies;
 mod weights;

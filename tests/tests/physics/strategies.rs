@@ -69,8 +69,7 @@ fn exact() -> [[f64; 3]; 2] {
             for lane in 0..3 {
                 let sigma = SIGMA[lane];
                 let irradiance = lamp(at(end), sigma, |w| w[2]);
-                out[0][lane] +=
-                    share * (-sigma * end).exp() * GROUND[lane] / PI * irradiance;
+                out[0][lane] += share * (-sigma * end).exp() * GROUND[lane] / PI * irradiance;
                 for (t, wt) in gauss(0.0, end) {
                     let phase = |w: [f64; 3]| {
                         // Light travels along −w and leaves along −d.
@@ -100,13 +99,20 @@ fn strategies_agree_with_quadrature() {
             let rendered = ready.render(100 + seed, 0, spp);
             let count = (harness::EDGE * harness::EDGE) as usize;
             for (lane, m) in lanes.iter_mut().enumerate() {
-                let sum: f64 = (0..count).map(|i| rendered.film.estimate(i).mean[lane]).sum();
+                let sum: f64 = (0..count)
+                    .map(|i| rendered.film.estimate(i).mean[lane])
+                    .sum();
                 m.add(sum / count as f64);
             }
         }
         for (lane, m) in lanes.iter().enumerate() {
             let what = format!("strategy s {s} t {t}, lane {lane}");
-            println!("{what}: {:.6} +- {:.6}, exact {:.6}", m.mean(), m.standard_error(), expected[lane]);
+            println!(
+                "{what}: {:.6} +- {:.6}, exact {:.6}",
+                m.mean(),
+                m.standard_error(),
+                expected[lane]
+            );
             suite.mean(what, m, expected[lane], 0.0);
         }
     }

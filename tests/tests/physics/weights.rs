@@ -78,7 +78,8 @@ fn each_path(mut f: impl FnMut(&SceneView<'_>, &Bidirectional, usize, usize, Spe
         for t in 2..=paths.sensor.len() {
             for s in 2..=paths.light.len() {
                 let nodes = |n: &[resolvent_pathspace::bidirectional::Node]| {
-                    n.iter().any(|n| n.delta || n.vertex.is(VertexKind::Emitter))
+                    n.iter()
+                        .any(|n| n.delta || n.vertex.is(VertexKind::Emitter))
                 };
                 if nodes(&paths.sensor.nodes()[1..t]) || nodes(&paths.light.nodes()[1..s]) {
                     continue;
@@ -137,7 +138,9 @@ fn walks_agree_with_sums_from_scratch() {
         worst_sum = worst_sum.max((sum - 1.0).abs());
         off_sum += u64::from((sum - 1.0).abs() > 1e-6);
         count += 1;
-        let media = path.vertices[1..n].iter().filter(|v| v.is(VertexKind::Medium));
+        let media = path.vertices[1..n]
+            .iter()
+            .filter(|v| v.is(VertexKind::Medium));
         let media = media.count();
         kinds[if media == 0 {
             0
@@ -153,9 +156,15 @@ fn walks_agree_with_sums_from_scratch() {
     );
     assert!(kinds.iter().all(|k| *k > 100), "{kinds:?}");
     // Directions are recomputed from positions: where vertices almost touch or a surface is grazed, few digits are left.
-    assert!(worst_value < 0.02 && off_value * 5000 <= count, "{off_value} of {count}");
+    assert!(
+        worst_value < 0.02 && off_value * 5000 <= count,
+        "{off_value} of {count}"
+    );
     // Closures are asked in single precision, and in another direction for every strategy.
-    assert!(worst_sum < 4e-6 && off_sum * 10_000 <= count, "{off_sum} of {count}");
+    assert!(
+        worst_sum < 4e-6 && off_sum * 10_000 <= count,
+        "{off_sum} of {count}"
+    );
 }
 
 /// What roulette multiplied the walks' weights by: what is left when contribution and densities are taken out.
