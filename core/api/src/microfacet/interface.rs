@@ -138,7 +138,7 @@ impl Interface {
         if self.thin {
             1.0 - self.width.single(w)
         } else {
-            1.0 - self.width.total(w.z.abs(), eta)
+            1.0 - self.width.total(w, eta)
         }
     }
 

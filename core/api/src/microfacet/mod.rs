@@ -6,6 +6,7 @@
 pub mod energy;
 pub mod fresnel;
 mod ggx;
+pub mod grain;
 mod interface;
 mod reflector;
 

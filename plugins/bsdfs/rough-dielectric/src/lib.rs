@@ -11,7 +11,7 @@
 //!
 //! Facets with the GGX distribution reflect and refract as in Walter et al. 2007; normals are sampled among those visible
 //! (Heitz 2018; Dupuy & Benyoub 2023). Light that meets more than one facet is returned in two diffuse lobes, so that nothing is
-//! lost and the whole stays reciprocal ([`resolvent_api::microfacet::Interface`] has the equations). x follows ∂p/∂u.
+//! lost (to 1 %, with anisotropy to 3 %) and the whole stays reciprocal ([`resolvent_api::microfacet::Interface`] has the equations). x follows ∂p/∂u.
 //!
 //! ```json
 //! "materials": { "frosted": { "plugin": "rough-dielectric", "params": { "ior": 1.52, "roughness": 0.4 } } }

@@ -29,13 +29,13 @@ fn fans(cosines: &[f32]) -> Vec<Vec3> {
 fn samples_follow_their_density() {
     let mut suite = Suite::new();
     for (params, cosines) in [
-        (r#"{ "roughness": 0.5 }"#, &[0.95, 0.3, -0.9, -0.5][..]),
-        (r#"{ "roughness": 0.75, "ior": 1.33 }"#, &[0.6, 0.1, -0.4]),
+        (r#"{ "roughness": 0.5 }"#, &[0.95, 0.3, -0.5][..]),
+        (r#"{ "roughness": 0.75, "ior": 1.33 }"#, &[0.1, -0.4]),
         (
             r#"{ "roughness": 0.7, "anisotropy": 0.6, "ior": 2.2 }"#,
-            &[0.8, -0.95, -0.2],
+            &[0.8, -0.2],
         ),
-        (r#"{ "roughness": 0.6, "ior": 0.75 }"#, &[0.9, 0.4, -0.3]),
+        (r#"{ "roughness": 0.6, "ior": 0.75 }"#, &[0.4, -0.3]),
         (
             r#"{ "roughness": 0.6, "thin": true, "anisotropy": 0.3 }"#,
             &[0.7, -0.25],
@@ -70,17 +70,19 @@ fn nothing_is_lost() {
             }
         }
     }
-    // With anisotropy the tables hold on average over the azimuth.
-    let k = boundary(r#"{ "roughness": 0.8, "anisotropy": 0.7 }"#);
-    for z in [1.0, 0.6, 0.2, -0.3, -0.8f32] {
-        let r = (1.0 - z * z).sqrt();
-        let mean = (0..32)
-            .map(|i| {
-                let (s, c) = (i as f32 * core::f32::consts::PI / 16.0).sin_cos();
-                albedo(&k, Vec3::new(r * c, r * s, z), 5000)[0] / 32.0
-            })
-            .sum::<f64>();
-        suite.close(&format!("anisotropic at {z}"), mean, 1.0, 0.0, 0.03);
+    // The tables of anisotropic facets are coarser.
+    for anisotropy in [0.3, 0.7, 0.9] {
+        let params = format!(r#"{{ "roughness": 0.8, "anisotropy": {anisotropy} }}"#);
+        let k = boundary(&params);
+        for z in [1.0, 0.6, 0.2, -0.3, -0.8f32] {
+            let r = (1.0 - z * z).sqrt();
+            for i in 0..5 {
+                let (s, c) = (0.4 * i as f32).sin_cos();
+                let wo = Vec3::new(r * c, r * s, z).normalize();
+                let what = format!("{params} at {wo}");
+                suite.close(&what, albedo(&k, wo, 10_000)[0], 1.0, 0.0, 0.03);
+            }
+        }
     }
     suite.assert();
 }
