@@ -51,8 +51,8 @@ impl Geometry {
 
 /// Position and normal of barycentrics (u, v), in f64: the only rounding that matters is the last one to f32.
 fn flat(vertices: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, DVec3, DVec3, Vec3) {
-    let [a, b, c] = vertices.map(|v| v.as_dvec3());
-    let (e1, e2) = (b - a, c - a);
+    let a = vertices[0].as_dvec3();
+    let (e1, e2) = (vertices[1].as_dvec3() - a, vertices[2].as_dvec3() - a);
     let p = a + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
     let n = e1.cross(e2);
     let n = match n.try_normalize() {
@@ -230,17 +230,29 @@ fn cylinder(c: &Cylinder, hit: &Hit, ray: &Ray) -> SurfacePoint {
 pub fn offset_origin(p: Vec3, p_error: Vec3, ng: Vec3, w: Vec3) -> Vec3 {
     let distance = ng.abs().dot(p_error);
     let offset = ng * if w.dot(ng) < 0.0 { -distance } else { distance };
-    let moved = (p + offset).to_array();
-    let offset = offset.to_array();
-    Vec3::from_array([0, 1, 2].map(|i| {
-        if offset[i] > 0.0 {
-            moved[i].next_up()
-        } else if offset[i] < 0.0 {
-            moved[i].next_down()
-        } else {
-            moved[i]
-        }
-    }))
+    let moved = p + offset;
+    Vec3::new(
+        one_float(moved.x, offset.x),
+        one_float(moved.y, offset.y),
+        one_float(moved.z, offset.z),
+    )
+}
+
+/// The float next to `x`, which is finite, on the side of the sign of `towards`; `x` itself if that is 0.
+///
+/// The signs of normals and positions are as good as random, so that branches on them cost more than all of this: bits of floats
+/// are ordered like their magnitudes, which grow by one step if the signs agree.
+#[inline(always)]
+fn one_float(x: f32, towards: f32) -> f32 {
+    let (bits, side) = (x.to_bits(), towards.to_bits());
+    let step = 1u32.wrapping_sub((bits ^ side) >> 31 << 1);
+    let next = f32::from_bits(bits.wrapping_add(step));
+    let next = if x == 0.0 {
+        f32::from_bits(1).copysign(towards)
+    } else {
+        next
+    };
+    if towards == 0.0 { x } else { next }
 }
 
 impl SurfacePoint {
@@ -252,5 +264,22 @@ impl SurfacePoint {
     /// The ray that leaves this point in direction `w`.
     pub fn spawn(&self, w: Vec3) -> Ray {
         Ray::new(self.offset(w), w)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_float_is_the_next_one() {
+        let mut stream = resolvent_api::rng::Stream::new(3);
+        let mut values = vec![0.0, -0.0, 1.0, -1.0, f32::MIN_POSITIVE, 1e-45, -1e-45, 3e18];
+        values.extend((0..1000).map(|_| f32::from_bits(stream.bits() as u32 & 0xbf7f_ffff)));
+        for x in values {
+            assert_eq!(one_float(x, 1e-30), x.next_up(), "{x:e}");
+            assert_eq!(one_float(x, -2.0), x.next_down(), "{x:e}");
+            assert_eq!(one_float(x, -0.0), x, "{x:e}");
+        }
     }
 }

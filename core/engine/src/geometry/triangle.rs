@@ -7,6 +7,7 @@
 
 use super::bvh8::Bounds;
 use super::ray::RaySetup;
+use glam::DVec3;
 
 /// Triangles in one packet.
 pub(super) const LANES: usize = 4;
@@ -35,6 +36,7 @@ pub(super) fn meets_front(ray: &RaySetup, vertices: [[f32; 3]; 3]) -> bool {
 }
 
 /// A vertex in the frame where the ray is the z axis: the same f32 operations as in the kernels.
+#[inline(always)]
 fn shear(ray: &RaySetup, p: [f32; 3]) -> [f64; 3] {
     let [kx, ky, kz] = ray.k;
     let z = p[kz] - ray.o[kz];
@@ -58,6 +60,14 @@ impl Packet {
         v: [[[f32::NAN; LANES]; 3]; 3],
         prim: [u32::MAX; LANES],
     };
+
+    /// A vertex of the triangle in a lane.
+    #[inline(always)]
+    fn vertex(&self, vertex: usize, lane: usize) -> [f32; 3] {
+        let rows = &self.v[vertex];
+        let lane = lane % LANES;
+        [rows[0][lane], rows[1][lane], rows[2][lane]]
+    }
 
     /// Triangles in it.
     pub fn count(&self) -> usize {
@@ -108,8 +118,7 @@ pub(super) fn bounds(triangle: &[[f32; 3]; 3]) -> Bounds {
 /// comes from the plane equation in f64, so that a ray which starts within f32 rounding of a triangle is put on the right side.
 /// Returns (t, u, v).
 ///
-/// Not marked cold, although few lanes come here: every ray that leaves a surface does, on the triangle it starts from, and
-/// cold code is compiled for size (measured: 9 % of the time of bench/surface_only).
+/// Few lanes come here, and still it is not cold: every ray that leaves a surface does, on the triangle it starts from.
 #[inline(never)]
 pub(super) fn decide_lane(
     ray: &RaySetup,
@@ -117,13 +126,17 @@ pub(super) fn decide_lane(
     lane: usize,
     t_max: f32,
 ) -> Option<(f32, f32, f32)> {
-    let vertex = |i: usize| packet.v[i].map(|row| row[lane]);
-    let v = [vertex(0), vertex(1), vertex(2)];
-    let [a, b, c] = v.map(|p| shear(ray, p));
+    let (v0, v1, v2) = (
+        packet.vertex(0, lane),
+        packet.vertex(1, lane),
+        packet.vertex(2, lane),
+    );
+    let (a, b, c) = (shear(ray, v0), shear(ray, v1), shear(ray, v2));
     let u = c[0] * b[1] - c[1] * b[0];
     let v_ = a[0] * c[1] - a[1] * c[0];
     let w = b[0] * a[1] - b[1] * a[0];
-    if (u < 0.0 || v_ < 0.0 || w < 0.0) && (u > 0.0 || v_ > 0.0 || w > 0.0) {
+    // Minimum and maximum instead of six comparisons: the signs are as good as random, and branches on them are guesses.
+    if u.min(v_).min(w) < 0.0 && u.max(v_).max(w) > 0.0 {
         return None;
     }
     let det = u + v_ + w;
@@ -133,8 +146,10 @@ pub(super) fn decide_lane(
     let s = f64::from(ray.s[2]);
     let z = [a[2] * s, b[2] * s, c[2] * s];
     // The hit lies between the vertices; this also tames a plane seen exactly edge on.
-    let t = plane_distance(ray, &v).unwrap_or((u * z[0] + v_ * z[1] + w * z[2]) / det);
-    let t = t.clamp(z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+    let t = plane_distance(ray, v0, v1, v2).unwrap_or((u * z[0] + v_ * z[1] + w * z[2]) / det);
+    let t = t
+        .max(z[0].min(z[1]).min(z[2]))
+        .min(z[0].max(z[1]).max(z[2]));
     if t > f64::from(ray.t_min) && t < f64::from(ray.t_max) && t as f32 <= t_max {
         Some((t as f32, (v_ / det) as f32, (w / det) as f32))
     } else {
@@ -143,15 +158,11 @@ pub(super) fn decide_lane(
 }
 
 /// Ray parameter of the triangle's plane, in f64; `None` if the triangle has no area or the ray lies in its plane.
-fn plane_distance(ray: &RaySetup, v: &[[f32; 3]; 3]) -> Option<f64> {
-    let sub = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|i| f64::from(a[i]) - f64::from(b[i]));
-    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let (e1, e2) = (sub(v[1], v[0]), sub(v[2], v[0]));
-    let n = [
-        e1[1] * e2[2] - e1[2] * e2[1],
-        e1[2] * e2[0] - e1[0] * e2[2],
-        e1[0] * e2[1] - e1[1] * e2[0],
-    ];
-    let t = dot(n, sub(v[0], ray.o)) / dot(n, ray.d.map(f64::from));
+#[inline(always)]
+fn plane_distance(ray: &RaySetup, v0: [f32; 3], v1: [f32; 3], v2: [f32; 3]) -> Option<f64> {
+    let wide = |v: [f32; 3]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
+    let a = wide(v0);
+    let n = (wide(v1) - a).cross(wide(v2) - a);
+    let t = n.dot(a - wide(ray.o)) / n.dot(wide(ray.d));
     (!t.is_nan()).then_some(t)
 }
