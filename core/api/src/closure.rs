@@ -3,6 +3,7 @@
 use crate::abi::{ScatterTable, Status};
 use crate::math::Vec3;
 use crate::operator::{Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample};
+use core::mem::MaybeUninit;
 
 /// Bytes a closure may occupy. Only those in use are ever written or copied by the SDK, so a small closure doesn't pay for a
 /// large one; the bound leaves room for two closures of 216 bytes nested in a third ([`crate::nested`]).
@@ -13,7 +14,8 @@ pub const CLOSURE_BYTES: usize = 496;
 #[derive(Clone, Copy)]
 pub struct Closure {
     table: *const ScatterTable,
-    data: [u64; CLOSURE_BYTES / 8],
+    /// Only as many bytes as the table says are ever written: the rest costs nothing to leave as it is.
+    data: [MaybeUninit<u64>; CLOSURE_BYTES / 8],
 }
 
 // SAFETY: the table is a static of a library that is never unloaded, and the data is that of a type the SDK bounds
@@ -35,7 +37,7 @@ impl Closure {
     /// Absorbs everything.
     pub const EMPTY: Self = Self {
         table: core::ptr::null(),
-        data: [0; CLOSURE_BYTES / 8],
+        data: [MaybeUninit::uninit(); CLOSURE_BYTES / 8],
     };
 
     /// Stores `value` with its table into `out`. Checked at compile time: it must fit in size and alignment.
