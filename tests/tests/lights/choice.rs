@@ -4,7 +4,7 @@ use crate::build::{by_power, distant, mixed, point_in, with_tree};
 use glam::Vec3;
 use resolvent_api::math::warp;
 use resolvent_api::rng::Stream;
-use resolvent_engine::light::{Light, Lights, Reference, TREE_FROM};
+use resolvent_engine::light::{Light, Lights, Reference, TREE_FROM, Tree};
 use resolvent_tests::chi2::chi2;
 use resolvent_tests::ztest::sidak;
 
@@ -89,13 +89,14 @@ fn choices_follow_their_probabilities() {
     }
 }
 
-/// Every light that can send anything to a point may be chosen for it: behind surfaces, at lights and within them too.
+/// Every light that can send anything to a point is chosen for it by importance: behind surfaces, at lights and within them.
 #[test]
 fn no_light_is_starved() {
     let mut s = Stream::new(13);
     let all = mixed(300, 5);
     let anchors: Vec<Vec3> = all.iter().filter_map(place).collect();
-    let lights = with_tree(all);
+    // Without the share of the choices that is uniform.
+    let lights = Tree::new(&all, 3).unwrap();
     let mut lit = 0;
     for (k, mut at) in references(&mut s, 400).into_iter().enumerate() {
         // Some at lights themselves.
@@ -103,7 +104,7 @@ fn no_light_is_starved() {
             at.p = anchors[k % anchors.len()];
         }
         for i in 0..300 {
-            let light = &lights.all[i];
+            let light = &all[i];
             let Some(sample) = light.sample(at.p, s.uniform2()) else {
                 continue;
             };
@@ -115,7 +116,7 @@ fn no_light_is_starved() {
             }
             lit += 1;
             assert!(
-                lights.probability(&at, i as u32) > 0.0,
+                lights.descent(&at, i as u32) > 0.0,
                 "light {i} shines on {at:?} and is never chosen"
             );
         }
@@ -221,7 +222,7 @@ fn degenerate_sets() {
     ];
     for set in sets {
         let n = set.len() as u32;
-        let tree = resolvent_engine::light::Tree::new(&set, 3).unwrap();
+        let tree = Tree::new(&set, 3).unwrap();
         assert!(tree.depth() <= 64, "{}", tree.depth());
         for p in [Vec3::ONE, Vec3::X, Vec3::splat(1e15), Vec3::ZERO] {
             let at = Reference {

@@ -1,7 +1,7 @@
 //! The light tree: chooses among many lights by an estimate of what each sends to a point.
 //!
 //! Conty Estevez & Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", without the splitting: one
-//! light is chosen, going down from the root by the importance of the two children. Vertices in media have no normal, and so
+//! light is chosen, going down from the root by the importance of the two children, or now and then any one ([`UNIFORM`]). Vertices in media have no normal, and so
 //! leave the cosine at the receiver out.
 
 use super::Light;
@@ -16,6 +16,10 @@ const MAX_COST_DEPTH: u32 = 40;
 
 /// Distance, relative to the extent of all lights, below which a light does not gain importance.
 const NEAR: f32 = 1e-4;
+
+/// Share of the choices that are uniform over all lights in the tree: importance knows nothing of what stands in between, and
+/// a weak light that is the only one to reach a point must not be starved by a strong one behind a wall.
+pub const UNIFORM: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug)]
 struct Node {
@@ -32,8 +36,8 @@ pub struct Tree {
     nodes: Vec<Node>,
     /// The leaf of each light of the scene; [`NO_LEAF`] for lights that are not in it.
     leaf_of: Vec<u32>,
-    /// How many lights are in it.
-    count: usize,
+    /// The lights that are in it.
+    lights: Vec<u32>,
     /// Squared distance below which lights do not gain importance.
     near: f32,
 }
@@ -61,7 +65,7 @@ impl Tree {
         let mut tree = Self {
             nodes: Vec::with_capacity(2 * items.len() - 1),
             leaf_of: vec![NO_LEAF; lights.len()],
-            count: items.len(),
+            lights: items.iter().map(|i| i.0).collect(),
             near,
         };
         // Shares of the total, so that sums over groups stay finite whatever the units and distances.
@@ -107,7 +111,7 @@ impl Tree {
 
     /// How many lights are in it.
     pub fn count(&self) -> usize {
-        self.count
+        self.lights.len()
     }
 
     /// Nodes on the longest way from the root.
@@ -122,7 +126,30 @@ impl Tree {
     /// Chooses a light for `at` by `u` in [0, 1), with its probability. `None` if it comes to a group of which no light reaches
     /// `at`: bounds of groups are wider than those of their lights, so this has a probability, too.
     #[inline]
-    pub fn choose(&self, at: &Reference, mut u: f64) -> Option<(u32, f32)> {
+    pub fn choose(&self, at: &Reference, u: f64) -> Option<(u32, f32)> {
+        let each = UNIFORM / self.lights.len() as f64;
+        let (light, probability) = if u < UNIFORM {
+            let k = ((u / each) as usize).min(self.lights.len() - 1);
+            (self.lights[k], self.descent(at, self.lights[k]))
+        } else {
+            self.descend(at, (u - UNIFORM) / (1.0 - UNIFORM))?
+        };
+        Some((light, (each + (1.0 - UNIFORM) * probability) as f32))
+    }
+
+    /// Probability with which [`Tree::choose`] chooses `light` for `at`.
+    #[inline]
+    pub fn probability(&self, at: &Reference, light: u32) -> f32 {
+        if !self.holds(light) {
+            return 0.0;
+        }
+        let each = UNIFORM / self.lights.len() as f64;
+        (each + (1.0 - UNIFORM) * self.descent(at, light)) as f32
+    }
+
+    /// Goes down from the root by importance.
+    #[inline]
+    fn descend(&self, at: &Reference, mut u: f64) -> Option<(u32, f64)> {
         let mut i = 0;
         let mut probability = 1.0f64;
         let mut node = &self.nodes[0];
@@ -142,18 +169,13 @@ impl Tree {
             }
             node = &self.nodes[i];
         }
-        Some((node.next, probability as f32))
+        Some((node.next, probability))
     }
 
-    /// Probability with which [`Tree::choose`] chooses `light` for `at`.
+    /// Probability of coming to `light`, which is in the tree, by importance alone.
     #[inline]
-    pub fn probability(&self, at: &Reference, light: u32) -> f32 {
-        let Some(mut i) = self.leaf_of.get(light as usize).copied() else {
-            return 0.0;
-        };
-        if i == NO_LEAF {
-            return 0.0;
-        }
+    pub fn descent(&self, at: &Reference, light: u32) -> f64 {
+        let mut i = self.leaf_of[light as usize];
         if i == 0 {
             let reaches = self.nodes[0].group.importance(at) > 0.0;
             return if reaches { 1.0 } else { 0.0 };
@@ -162,7 +184,7 @@ impl Tree {
         loop {
             let parent = self.nodes[i as usize].parent;
             if parent == u32::MAX {
-                return probability as f32;
+                return probability;
             }
             let Some((left, right)) = self.shares(parent as usize, at) else {
                 return 0.0;
