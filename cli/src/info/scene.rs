@@ -107,6 +107,7 @@ fn light(l: &Light) -> &'static str {
         Light::Distant { .. } => "distant",
         Light::Point { .. } => "point",
         Light::Spot { .. } => "spot",
+        Light::SunSky { .. } => "sun and sky",
         Light::Rectangle { .. } => "rectangle",
     }
 }

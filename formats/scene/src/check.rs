@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::{Place, Problem};
-use crate::format::{COORDINATE, Kind, Object, POWER, Range, Rule};
+use crate::format::{COORDINATE, Kind, Object, POWER, Range, Rule, SHARE};
 use crate::json::{Data, Document, Member, Node, quoted};
 use crate::nearest::hint;
 use crate::transform::{Transform, length};
@@ -114,6 +114,10 @@ impl<'d> Checker<'d> {
             Kind::Spectrum => match node.data {
                 Data::Number(_) => self.number(node, POWER),
                 _ => self.numbers(node, 3, "a number or a list of three (RGB)", POWER),
+            },
+            Kind::Share => match node.data {
+                Data::Number(_) => self.number(node, SHARE),
+                _ => self.numbers(node, 3, "a number or a list of three (RGB)", SHARE),
             },
             Kind::Transform => {
                 if let Err((at, what)) = transform(node) {

@@ -302,6 +302,24 @@ pub enum Light {
         /// Full angle of the inner cone, degrees, from 0 to `angle_deg`.
         inner_angle_deg: f64,
     },
+    /// A clear sky with its sun (Preetham, Shirley & Smits 1999), +y up. Radiances are linear sRGB in W·sr⁻¹·m⁻² weighted by the
+    /// eye's sensitivity: times 683 lm/W they are luminances.
+    SunSky {
+        /// Towards the sun in the sky's own space, y ≥ 0; need not be of length 1.
+        to_sun: Vec3,
+        /// Haze, from 2 (clear) to 10.
+        turbidity: f64,
+        /// Albedo of the plane below the horizon, 0 to 1.
+        ground_albedo: Vec3,
+        /// Factor on everything, ≥ 0.
+        scale: Vec3,
+        /// There is a sun's disc; the ground shows its light in any case.
+        sun: bool,
+        /// Full angle of the disc, degrees, in [0, 180]; the irradiance does not depend on it, 0 is parallel light.
+        sun_angle_deg: f64,
+        /// The sky's space to world, a rotation.
+        rotation: Transform,
+    },
     /// A parallelogram that emits from the side where edge_u × edge_v points.
     Rectangle {
         /// One corner.

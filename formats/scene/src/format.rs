@@ -120,6 +120,8 @@ pub(crate) enum Kind {
     Triangles,
     /// One number or three, ≥ 0.
     Spectrum,
+    /// One number or three, from 0 to 1.
+    Share,
     /// A matrix or a list of operations.
     Transform,
     /// The parameters of a plugin of this kind.
@@ -220,6 +222,7 @@ pub(crate) static SCENE: Object = Object {
                 &DISTANT,
                 &POINT,
                 &SPOT,
+                &SUN_SKY,
                 &RECTANGLE_LIGHT,
             ])),
             "Lights",
@@ -514,6 +517,58 @@ static SPOT: Object = Object {
     rules: &[],
 };
 
+static SUN_SKY: Object = Object {
+    name: "sun_sky",
+    help: "A clear sky with its sun, in linear sRGB, W/(sr m²) weighted by the eye's sensitivity (683 lm/W)",
+    fields: &[
+        may(
+            "to_sun",
+            Kind::Vec3,
+            "Direction towards the sun, above the horizon; +y is up",
+        ),
+        may(
+            "elevation_deg",
+            Kind::Number(Range::closed(0.0, 90.0)),
+            "Angle of the sun above the horizon",
+        ),
+        may(
+            "azimuth_deg",
+            Kind::Number(Range::closed(-360.0, 360.0)),
+            "Angle of the sun from +z towards +x (0)",
+        ),
+        may(
+            "turbidity",
+            Kind::Number(Range::closed(2.0, 10.0)),
+            "Haze, from 2 (clear) to 10 (3)",
+        ),
+        may(
+            "ground_albedo",
+            Kind::Share,
+            "Albedo of the plane below the horizon (0.2)",
+        ),
+        may("scale", Kind::Spectrum, "Factor on everything (1)"),
+        may(
+            "sun",
+            Kind::Bool,
+            "There is a sun's disc (true); the ground shows its light in any case",
+        ),
+        may(
+            "sun_angle_deg",
+            Kind::Number(Range::closed(0.0, 180.0)),
+            "Full angle of the sun's disc in degrees, at equal irradiance (0.533)",
+        ),
+        may(
+            "transform",
+            Kind::Transform,
+            "The sky's space to world: a rotation",
+        ),
+    ],
+    rules: &[
+        Rule::ExactlyOne(&["to_sun", "elevation_deg"]),
+        Rule::Needs("azimuth_deg", "elevation_deg"),
+    ],
+};
+
 static RECTANGLE_LIGHT: Object = Object {
     name: "rectangle",
     help: "A parallelogram that emits from the side where edge_u × edge_v points",
@@ -689,6 +744,9 @@ static PLY: Object = Object {
 
 /// The range of every coordinate.
 pub(crate) const COORDINATE: Range = Range::closed(-FAR, FAR);
+
+/// The range of albedos.
+pub(crate) const SHARE: Range = Range::closed(0.0, 1.0);
 
 /// The range of every radiometric value.
 pub(crate) const POWER: Range = Range::closed(0.0, BRIGHT);

@@ -287,13 +287,7 @@ impl Reader<'_> {
                     radiance: spectrum(node, "radiance")?,
                 },
                 Some(image) => {
-                    let rotation = to_world(node)?;
-                    if let (Some(at), Some(fault)) =
-                        (node.get("transform"), rotation.rotation_fault())
-                    {
-                        self.checker
-                            .report(at, format!("expected a rotation, found {fault}"));
-                    }
+                    let rotation = self.rotation(node)?;
                     let scale = spectrum(node, "scale").unwrap_or([1.0; 3]);
                     Environment::Image {
                         file: image.into(),
@@ -314,6 +308,15 @@ impl Reader<'_> {
             "point" => Light::Point {
                 position: vec3(node, "position")?,
                 intensity: spectrum(node, "intensity")?,
+            },
+            "sun_sky" => Light::SunSky {
+                to_sun: self.to_sun(node)?,
+                turbidity: number(node, "turbidity").unwrap_or(3.0),
+                ground_albedo: spectrum(node, "ground_albedo").unwrap_or([0.2; 3]),
+                scale: spectrum(node, "scale").unwrap_or([1.0; 3]),
+                sun: flag(node, "sun").unwrap_or(true),
+                sun_angle_deg: number(node, "sun_angle_deg").unwrap_or(0.533),
+                rotation: self.rotation(node)?,
             },
             "spot" => {
                 let angle_deg = number(node, "angle_deg")?;
@@ -356,6 +359,31 @@ impl Reader<'_> {
             self.checker.report(node, what);
         }
         Some([vec3(node, "corner")?, edge_u, edge_v])
+    }
+
+    /// A direction towards the sun, from either way to give it.
+    fn to_sun(&mut self, node: &Node) -> Option<Vec3> {
+        if let Some(elevation) = number(node, "elevation_deg") {
+            let azimuth = number(node, "azimuth_deg").unwrap_or(0.0).to_radians();
+            let (sin, cos) = elevation.to_radians().sin_cos();
+            return Some([cos * azimuth.sin(), sin, cos * azimuth.cos()]);
+        }
+        let to_sun = self.direction(node, "to_sun")?;
+        if to_sun[1] < 0.0 {
+            let what = format!("expected a sun above the horizon (y ≥ 0), found {to_sun:?}");
+            self.checker.report(node.get("to_sun")?, what);
+        }
+        Some(to_sun)
+    }
+
+    /// A transform that must be a rotation.
+    fn rotation(&mut self, node: &Node) -> Option<Transform> {
+        let rotation = to_world(node)?;
+        if let (Some(at), Some(fault)) = (node.get("transform"), rotation.rotation_fault()) {
+            self.checker
+                .report(at, format!("expected a rotation, found {fault}"));
+        }
+        Some(rotation)
     }
 
     /// A vector that must not be zero.

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::declare::{ParamDecl, ParamKind, PluginDecl};
-use crate::format::{COORDINATE, Kind, Object, POWER, Range, Rule, SCENE};
+use crate::format::{COORDINATE, Kind, Object, POWER, Range, Rule, SCENE, SHARE};
 use crate::write::value;
 
 /// The schema of scene files. Blocks that name one of the plugins given are held to its declaration;
@@ -75,6 +75,7 @@ impl Builder<'_> {
                 let triangle = self.kind(&Kind::Integers(3, 0, u64::from(u32::MAX)));
                 json!({"type": "array", "items": triangle})
             }
+            Kind::Share => json!({"anyOf": [number(SHARE), numbers(3, SHARE)]}),
             Kind::Spectrum => json!({"anyOf": [number(POWER), numbers(3, POWER)]}),
             Kind::Transform => json!({"$ref": "#/$defs/transform"}),
             Kind::Params(_) => {

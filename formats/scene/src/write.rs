@@ -248,6 +248,23 @@ fn light(l: &Light) -> Json {
         } => {
             json!({"type": "point", "position": position, "intensity": spectrum(*intensity)})
         }
+        Light::SunSky {
+            to_sun,
+            turbidity,
+            ground_albedo,
+            scale,
+            sun,
+            sun_angle_deg,
+            rotation,
+        } => {
+            let mut out = json!({
+                "type": "sun_sky", "to_sun": to_sun, "turbidity": turbidity,
+                "ground_albedo": spectrum(*ground_albedo), "scale": spectrum(*scale),
+                "sun": sun, "sun_angle_deg": sun_angle_deg,
+            });
+            put_transform(&mut out, rotation);
+            out
+        }
         Light::Spot {
             position,
             direction,

@@ -99,7 +99,7 @@ fn keys_and_names() {
     expect(
         "\"type\": \"distant\"",
         "\"type\": \"sun\"",
-        r#"full.json:20:14: $.lights[2].type: unknown type "sun"; known: "environment", "distant", "point", "spot", "rectangle""#,
+        r#"full.json:20:14: $.lights[2].type: unknown type "sun"; did you mean "sun_sky"?"#,
     );
     expect(
         "\"albedo\", \"normal\"",

@@ -50,7 +50,7 @@ fn every_key_arrives() {
     );
     assert_eq!(s.integrator, PluginBlock::new("pt").with("max_depth", 12.0));
 
-    assert_eq!(s.lights.len(), 6);
+    assert_eq!(s.lights.len(), 7);
     assert_eq!(
         s.lights[5],
         Light::Spot {

@@ -13,6 +13,7 @@ mod judge;
 mod scenes;
 
 mod instances;
+mod lights;
 mod materials;
 mod nested;
 mod points;

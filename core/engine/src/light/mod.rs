@@ -9,6 +9,7 @@ mod distribution;
 mod emission;
 mod image;
 mod select;
+mod sky;
 mod spot;
 mod tree;
 
@@ -17,6 +18,7 @@ pub use distribution::Distribution;
 pub use emission::BoundingSphere;
 pub use image::ImageEnvironment;
 pub use select::{Chooser, Lights, Reference, TREE_FROM};
+pub use sky::{EFFICACY, Sky, SunSky};
 pub use spot::Spot;
 pub use tree::Tree;
 

@@ -8,9 +8,9 @@ use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
-use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights, Spot};
+use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights, Spot, SunSky};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use resolvent_api::abi::scene_traits;
 use resolvent_api::medium::medium_traits;
 use resolvent_api::{Aabb, Affine, PluginKind, Spectrum, Vec3};
@@ -205,6 +205,7 @@ impl Scene {
                     });
                     shapes.push(Shape::Quad(quad));
                 }
+                describe::Light::SunSky { .. } => lights.extend(sun_sky(light)),
                 other => lights.extend(distant_light(scene, other, centre)?),
             }
         }
@@ -444,6 +445,35 @@ fn unit(v: [f64; 3]) -> Vec3 {
     (v / v.abs().max_element()).normalize().as_vec3()
 }
 
+/// A sky and its sun.
+fn sun_sky(light: &describe::Light) -> Vec<Light> {
+    let describe::Light::SunSky {
+        to_sun,
+        turbidity,
+        ground_albedo,
+        scale,
+        sun,
+        sun_angle_deg,
+        rotation,
+    } = light
+    else {
+        return Vec::new();
+    };
+    if scale.iter().all(|v| *v == 0.0) {
+        return Vec::new();
+    }
+    let [x_axis, y_axis, z_axis] = affine(rotation).columns;
+    SunSky {
+        to_sun: unit(*to_sun).as_dvec3().normalize(),
+        turbidity: *turbidity,
+        ground_albedo: *ground_albedo,
+        scale: *scale,
+        sun_angle_deg: sun.then_some(*sun_angle_deg),
+        to_world: DMat3::from_cols(x_axis, y_axis, z_axis),
+    }
+    .lights()
+}
+
 /// Lights that are no surfaces; black ones are left out.
 fn distant_light(
     scene: &describe::Scene,
@@ -521,7 +551,7 @@ fn distant_light(
                 *inner_angle_deg,
             ))
         }),
-        describe::Light::Rectangle { .. } => None,
+        describe::Light::Rectangle { .. } | describe::Light::SunSky { .. } => None,
     })
 }
 

@@ -25,7 +25,7 @@ pub const FULL: &str = r#"{
     {"type": "environment", "radiance": 0.1},
     {"type": "distant", "to_light": [0.6, 0.7, 0.4], "irradiance": [3, 3, 2.5], "angle_deg": 0.53},
     {"type": "point", "position": [0, 5, 0], "intensity": 40},
-    {"type": "rectangle", "corner": [-1, 4, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "radiance": [5, 4, 3], "two_sided": true}, {"type": "spot", "position": [1, 6, 0], "direction": [0, -2, 0], "intensity": [9, 8, 7], "angle_deg": 50, "inner_angle_deg": 20}
+    {"type": "rectangle", "corner": [-1, 4, -1], "edge_u": [2, 0, 0], "edge_v": [0, 0, 2], "radiance": [5, 4, 3], "two_sided": true}, {"type": "spot", "position": [1, 6, 0], "direction": [0, -2, 0], "intensity": [9, 8, 7], "angle_deg": 50, "inner_angle_deg": 20}, {"type": "sun_sky", "to_sun": [1, 2, 3], "turbidity": 4, "ground_albedo": [0.1, 0.2, 0.3], "scale": 2, "sun": false, "sun_angle_deg": 1, "transform": [{"rotate_deg": {"axis": [1, 0, 0], "angle": 90}}]}
   ],
   "materials": {
     "floor": {"plugin": "diffuse", "params": {"reflectance": [0.6, 0.55, 0.5]}},
