@@ -2,7 +2,7 @@
 
 mod geometry_common;
 
-use geometry_common::{Uniform, icosphere, rays_in_test};
+use geometry_common::{Uniform, icosphere, share_of};
 use glam::{Vec3, vec3};
 use resolvent_engine::geometry::{Accel, Geometry, Ray, Shape, TriangleMesh};
 
@@ -21,7 +21,7 @@ fn leaks(
     let mut accel = Accel::build(geometry).unwrap().unwrap();
     let mut random = Uniform(7);
     let mut rays = Vec::new();
-    for i in 0..rays_in_test(1_000_000) {
+    for i in 0..share_of(1_000_000, 150_000) {
         let t =
             mesh.indices[(random.next() * mesh.indices.len() as f32) as usize % mesh.indices.len()];
         let [a, b] = [t[i % 3], t[(i + 1) % 3]].map(|k| mesh.positions[k as usize]);
@@ -141,7 +141,7 @@ fn close_to_large_triangles() {
     .unwrap()
     .unwrap();
     let mut random = Uniform(3);
-    for _ in 0..rays_in_test(1_000_000) {
+    for _ in 0..share_of(1_000_000, 150_000) {
         let along = 2.0 * random.next() - 1.0;
         // On an edge of the face x = 1000: y = z, y = −z.
         let target = vec3(
@@ -196,7 +196,7 @@ fn edges_at_the_faces_of_boxes() {
         })
         .unwrap()
         .unwrap();
-        for _ in 0..rays_in_test(200_000) {
+        for _ in 0..share_of(200_000, 40_000) {
             // Next to the edges through the middle, within what rounding moves them by, from a height of a millionth to a
             // hundredth of the triangles' size.
             let across = usize::from(random.next() < 0.5);
@@ -239,7 +239,7 @@ fn vertices_on_a_line_close_gaps() {
     assert_eq!(accel.stats().degenerate_triangles, 0);
     let mut random = Uniform(5);
     let mut on_the_line = 0;
-    for _ in 0..rays_in_test(1_000_000) {
+    for _ in 0..share_of(1_000_000, 150_000) {
         let target = a + (b - a) * (0.01 + 0.98 * random.next());
         let o = target + random.direction() * 20.0;
         // Stay clear of the plane of the mesh, where a rim is a rim.

@@ -136,14 +136,29 @@ impl Place {
         }
     }
 
-    /// The surface at a `hit` on this copy; its `shape` counts the shapes of the prototype, whose geometry is `geometry`.
-    pub fn interaction(&self, geometry: &Geometry, hit: &Hit, ray: &Ray) -> SurfacePoint {
-        let object = Ray {
-            t_min: 0.0,
-            t_max: f32::INFINITY,
-            ..self.ray(ray, hit.t)
+    /// The surface at a `hit` on this copy; its `shape` counts the shapes of the prototype, whose geometry is `geometry` and whose size
+    /// is at most `size`.
+    pub fn interaction(
+        &self,
+        geometry: &Geometry,
+        size: f64,
+        hit: &Hit,
+        ray: &Ray,
+    ) -> SurfacePoint {
+        // From before the prototype, but not from farther away than needed.
+        let speed = times(&self.inverse, ray.d.as_dvec3()).length();
+        let start = ((f64::from(hit.t) - 1.1 * size / speed) as f32).max(0.0);
+        let object = self.ray(ray, start);
+        let local = Hit {
+            t: hit.t - start,
+            ..*hit
         };
-        let at = geometry.interaction(&Hit { t: 0.0, ..*hit }, &object);
+        // The errors below, as the prototype sees them.
+        let met = ray.o.as_dvec3() - self.translation() + ray.d.as_dvec3() * f64::from(hit.t);
+        let inside = times(&self.inverse, met).abs();
+        let error = 2.0 * self.outward(inside) + (met + self.translation()).abs();
+        let further = times(&self.inverse.map(|r| r.map(f64::abs)), ROUND * error);
+        let at = geometry.interaction_apart(&local, &object, further.element_sum());
         let exact = at.p.as_dvec3();
         let p = times(&self.linear(), exact) + self.translation();
         // The position's own error, and that of the next ray's origin when it comes back.

@@ -12,7 +12,7 @@ use super::triangle;
 /// A point on a surface and its local frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// Position, scene units: interpolated from the vertices, not o + t·d.
+    /// Position, scene units: interpolated from the vertices, not o + t·d, and off the edges of triangles by a few roundings.
     pub p: Vec3,
     /// Bound on the distance of `p` from the surface along each axis.
     pub p_error: Vec3,
@@ -39,9 +39,14 @@ impl Geometry {
     /// # Panics
     /// If the hit names a shape or primitive that does not exist.
     pub fn interaction(&self, hit: &Hit, ray: &Ray) -> SurfacePoint {
+        self.interaction_apart(hit, ray, 0.0)
+    }
+
+    /// [`Geometry::interaction`] for a surface whose points have a further rounding error, summed over the axes.
+    pub(super) fn interaction_apart(&self, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         match &self.shapes[hit.shape as usize] {
-            Shape::Mesh(m) => mesh(m, hit, ray),
-            Shape::Quad(q) => quad(q, hit, ray),
+            Shape::Mesh(m) => mesh(m, hit, ray, further),
+            Shape::Quad(q) => quad(q, hit, ray, further),
             Shape::Sphere(s) => sphere(s, hit, ray),
             Shape::Disk(d) => disk(d, hit, ray),
             Shape::Cylinder(c) => cylinder(c, hit, ray),
@@ -49,12 +54,58 @@ impl Geometry {
     }
 }
 
+/// Distance that points keep from the edges of their triangle, in units of their rounding error summed over the axes. Moving a ray's
+/// origin off the triangle takes up to 3 of them; at an edge of angle φ it then is on the right side of the neighbour, too, if
+/// sin φ times this is more than that: for all but the sharpest edges.
+const EDGE_MARGIN: f64 = 16.0;
+
+/// Unit roundoff of f32.
+const ROUND: f64 = 1.0 / 16_777_216.0;
+
+/// A point on or within rounding of an edge, moved inwards by a little more than its rounding error: next to the edge, the origin of
+/// the next ray would otherwise fall behind the neighbouring triangle as often as not, and light would leak. It moves towards the
+/// centre, but no farther than that takes in corners of ordinary angles. `sides` is the
+/// squared length of the longest edge, `n` the edges' cross product, `least` the smallest barycentric weight.
+#[cold]
+fn off_edge(p: DVec3, centre: DVec3, n: DVec3, sides: f64, least: f64, margin: f64) -> DVec3 {
+    let wanted = margin * sides.sqrt() / n.length();
+    let towards = centre - p;
+    let share = ((wanted - least) / (1.0 / 3.0 - least)).min(2.5 * margin / towards.length());
+    // False also where the triangle has no area.
+    if share > 0.0 && share <= 1.0 {
+        p + towards * share
+    } else {
+        p
+    }
+}
+
+/// A point of a triangle: position and its error, edges from the first vertex, normal.
+struct Flat {
+    p: Vec3,
+    p_error: Vec3,
+    e1: DVec3,
+    e2: DVec3,
+    n: Vec3,
+}
+
 /// Position and normal of barycentrics (u, v), in f64: the only rounding that matters is the last one to f32.
-fn flat(vertices: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, DVec3, DVec3, Vec3) {
+fn flat(vertices: [Vec3; 3], hit: &Hit, ray: &Ray, further: f64) -> Flat {
     let a = vertices[0].as_dvec3();
     let (e1, e2) = (vertices[1].as_dvec3() - a, vertices[2].as_dvec3() - a);
-    let p = a + e1 * f64::from(hit.u) + e2 * f64::from(hit.v);
+    let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+    let mut p = a + e1 * u + e2 * v;
     let n = e1.cross(e2);
+    // The distance to an edge is its weight times the height over it, and heights are at least |n| over the longest edge.
+    let least = u.min(v).min(1.0 - u - v);
+    let sides = e1
+        .length_squared()
+        .max(e2.length_squared())
+        .max((e2 - e1).length_squared());
+    let rounding = ROUND * (p.x.abs() + p.y.abs() + p.z.abs()) + further;
+    let margin = EDGE_MARGIN * rounding;
+    if least.max(0.0).powi(2) * n.length_squared() < margin * margin * sides {
+        p = off_edge(p, a + (e1 + e2) / 3.0, n, sides, least, margin);
+    }
     let n = match n.try_normalize() {
         Some(n) => n.as_vec3(),
         // Three vertices on a line, met at the gap that they cover between their neighbours: any normal, on the right side.
@@ -65,7 +116,14 @@ fn flat(vertices: [Vec3; 3], hit: &Hit, ray: &Ray) -> (DVec3, DVec3, DVec3, Vec3
             if front { -back } else { back }
         }
     };
-    (p, e1, e2, n)
+    let (p, p_error) = rounded(p);
+    Flat {
+        p,
+        p_error,
+        e1,
+        e2,
+        n,
+    }
 }
 
 /// Rounds a position to f32 and bounds what that did: half a unit in the last place, and a trace for the f64 part before.
@@ -77,10 +135,15 @@ fn rounded(p: DVec3) -> (Vec3, Vec3) {
     )
 }
 
-fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray) -> SurfacePoint {
+fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
     let corner = m.indices[hit.prim as usize].map(|i| i as usize);
-    let (p, e1, e2, ng) = flat(corner.map(|i| m.positions[i]), hit, ray);
-    let (p, p_error) = rounded(p);
+    let Flat {
+        p,
+        p_error,
+        e1,
+        e2,
+        n: ng,
+    } = flat(corner.map(|i| m.positions[i]), hit, ray, further);
     let (u, v) = (hit.u, hit.v);
     let ns = if m.normals.is_empty() {
         ng
@@ -118,9 +181,10 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray) -> SurfacePoint {
     }
 }
 
-fn quad(q: &Quad, hit: &Hit, ray: &Ray) -> SurfacePoint {
-    let (p, _, _, ng) = flat(q.triangle(hit.prim), hit, ray);
-    let (p, p_error) = rounded(p);
+fn quad(q: &Quad, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
+    let Flat {
+        p, p_error, n: ng, ..
+    } = flat(q.triangle(hit.prim), hit, ray, further);
     let (u, v) = (hit.u, hit.v);
     // Half 0 is corner + u·edge_u + v·(edge_u + edge_v), half 1 is corner + u·(edge_u + edge_v) + v·edge_v.
     let uv = if hit.prim == 0 {

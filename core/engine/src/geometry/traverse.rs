@@ -26,6 +26,24 @@ pub(super) struct Tree {
 }
 
 impl Tree {
+    /// Box of the whole, as (min, max).
+    pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        let fold = |row: usize, f: fn(f32, f32) -> f32, start: f32| {
+            self.nodes[0].bounds[row].iter().copied().fold(start, f)
+        };
+        (
+            [0, 2, 4].map(|r| fold(r, f32::min, f32::INFINITY)),
+            [1, 3, 5].map(|r| fold(r, f32::max, f32::NEG_INFINITY)),
+        )
+    }
+
+    /// Diagonal of that box.
+    pub fn size(&self) -> f64 {
+        let (min, max) = self.bounds();
+        let [min, max] = [min, max].map(|p| glam::Vec3::from_array(p).as_dvec3());
+        (max - min).length()
+    }
+
     /// A tree that no ray meets.
     pub fn nothing() -> Self {
         Self {

@@ -16,6 +16,8 @@ pub(super) struct Prototype {
     /// Number of the first primitive of each shape, and the total.
     first: Vec<u32>,
     tree: Tree,
+    /// Diagonal of its box.
+    size: f64,
 }
 
 /// All instances of a scene.
@@ -62,6 +64,7 @@ impl Instances {
             built.push(build::build(&primitives).map(|tree| Prototype {
                 first: geometry.first_primitives(),
                 geometry,
+                size: tree.size(),
                 tree,
             }));
         }
@@ -128,23 +131,21 @@ impl Instances {
         let (instance, shape) = self.decode(hit.shape)?;
         let place = self.places.get(instance as usize)?;
         let prototype = self.prototypes[place.prototype as usize].as_ref()?;
-        let at = place.interaction(&prototype.geometry, &Hit { shape, ..*hit }, ray);
+        let at = place.interaction(
+            &prototype.geometry,
+            prototype.size,
+            &Hit { shape, ..*hit },
+            ray,
+        );
         Some(SurfacePoint {
             shape: hit.shape,
             ..at
         })
     }
 
-    /// Boxes of the whole, as (min, max).
+    /// The box of the whole, as (min, max).
     pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
-        let root = &self.top.nodes[0];
-        let fold = |row: usize, f: fn(f32, f32) -> f32, start: f32| {
-            root.bounds[row].iter().copied().fold(start, f)
-        };
-        (
-            [0, 2, 4].map(|r| fold(r, f32::min, f32::INFINITY)),
-            [1, 3, 5].map(|r| fold(r, f32::max, f32::NEG_INFINITY)),
-        )
+        self.top.bounds()
     }
 
     pub fn trees(&self) -> impl Iterator<Item = &Tree> {

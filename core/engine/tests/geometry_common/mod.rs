@@ -49,6 +49,12 @@ pub fn rays_in_test(full: usize) -> usize {
     }
 }
 
+/// `full` with `RESOLVENT_FULL=1` in the environment, else `part`; a tenth of that in debug builds.
+pub fn share_of(full: usize, part: usize) -> usize {
+    let all = std::env::var_os("RESOLVENT_FULL").is_some_and(|v| v == "1");
+    rays_in_test(if all { full } else { part })
+}
+
 /// Unit icosahedron with every triangle split in four `levels` times: 20·4^levels triangles, wound outwards.
 pub fn icosphere(levels: u32) -> TriangleMesh {
     let g = (1.0 + 5f32.sqrt()) / 2.0;
