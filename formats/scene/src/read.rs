@@ -310,7 +310,7 @@ impl Reader<'_> {
                 intensity: spectrum(node, "intensity")?,
             },
             "sun_sky" => Light::SunSky {
-                to_sun: self.to_sun(node)?,
+                to_sun: self.sun_direction(node)?,
                 turbidity: number(node, "turbidity").unwrap_or(3.0),
                 ground_albedo: spectrum(node, "ground_albedo").unwrap_or([0.2; 3]),
                 scale: spectrum(node, "scale").unwrap_or([1.0; 3]),
@@ -362,7 +362,7 @@ impl Reader<'_> {
     }
 
     /// A direction towards the sun, from either way to give it.
-    fn to_sun(&mut self, node: &Node) -> Option<Vec3> {
+    fn sun_direction(&mut self, node: &Node) -> Option<Vec3> {
         if let Some(elevation) = number(node, "elevation_deg") {
             let azimuth = number(node, "azimuth_deg").unwrap_or(0.0).to_radians();
             let (sin, cos) = elevation.to_radians().sin_cos();
