@@ -143,6 +143,7 @@ fn to_json(p: &Plugin) -> Json {
             "default": d.default.as_ref().map(value),
             "min": d.min, "max": d.max,
             "min_excluded": d.min_excluded, "max_excluded": d.max_excluded,
+            "texturable": d.texturable,
             "unit": d.unit,
             "help": d.help,
         })).collect::<Vec<_>>(),
@@ -163,6 +164,7 @@ fn value(v: &Value) -> Json {
                 .collect();
             json!({"plugin": block.plugin, "params": params})
         }
+        Value::Texture(name) => json!({"texture": name}),
     }
 }
 
@@ -194,6 +196,9 @@ fn print(p: &Plugin) {
             ParamKind::Choice(c) => c.join(" | "),
             other => kind_name(other),
         }];
+        if d.texturable {
+            facts.push("or a texture".into());
+        }
         facts.extend(range(d));
         if !d.unit.is_empty() {
             facts.push(format!("unit {}", d.unit));

@@ -125,6 +125,7 @@ fn figures(run: &Run) -> Value {
         "plugins": plugins(run.registry),
         "files": files(run.described, run.registry),
         "media": media(run.scene),
+        "textures": textures(run.scene),
         "geometry": geometry(run.scene),
         "lights": run.scene.light_count(),
         "image": {
@@ -211,6 +212,23 @@ fn media(scene: &Scene) -> Value {
             })
         })
         .collect()
+}
+
+/// The images that textures in use were read from.
+fn textures(scene: &Scene) -> Value {
+    let all = &scene.textures;
+    json!({
+        "read": all.len(),
+        "bytes_read": all.iter().map(|t| t.file_bytes).sum::<u64>(),
+        "memory_bytes": all.iter().map(|t| t.texels.data.bytes()).sum::<usize>(),
+        "images": all.iter().map(|t| json!({
+            "name": t.name,
+            "size": [t.texels.width, t.texels.height],
+            "channels": t.texels.channels,
+            "bytes_read": t.file_bytes,
+            "memory_bytes": t.texels.data.bytes(),
+        })).collect::<Vec<_>>(),
+    })
 }
 
 fn geometry(scene: &Scene) -> Value {

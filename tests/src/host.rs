@@ -9,7 +9,8 @@ use resolvent_api::export::{BsdfShim, header};
 use resolvent_api::{Affine, Bsdf, Params, Plugin, PluginKind};
 use serde_json::Value;
 
-/// An instance of `T` with the given parameters (a JSON object), three lanes and no transform.
+/// An instance of `T` with the given parameters (a JSON object), three lanes and no transform. A texturable parameter may be
+/// `{"texture": "uv"}`, whose red, green, blue and alpha are u, v, 0 and 1.
 ///
 /// # Errors
 /// If a parameter is unknown, missing, mistyped or out of range, or the plugin refuses.
@@ -105,6 +106,13 @@ fn with_args<T: Plugin, R>(
             }
             None => continue,
         };
+        if value.get("texture").is_some() {
+            if decl.flags & param_flags::TEXTURABLE == 0 {
+                return Err(format!("'{name}': takes no texture"));
+            }
+            held.push((ParamKind::Texture as u32, Default::default(), name));
+            continue;
+        }
         held.push((
             decl.kind,
             read(decl, &value).map_err(|e| format!("'{name}': {e}"))?,
@@ -122,7 +130,8 @@ fn with_args<T: Plugin, R>(
                 numbers: numbers.as_ptr(),
                 text: Text::new(text),
                 header: inner.map_or(core::ptr::null(), |i| core::ptr::from_ref(i.header)),
-                instance: inner.map_or(core::ptr::null(), |i| i.instance),
+                // Any address will do as the handle of the one texture.
+                instance: inner.map_or(name.as_ptr().cast(), |i| i.instance),
             }
         })
         .collect();
@@ -192,6 +201,17 @@ unsafe extern "C" fn one_by_one(_: *mut c_void, count: usize, task: Task, data: 
     }
 }
 
+/// The one texture there is: (u, v) themselves, and 0 and 1.
+unsafe extern "C" fn coordinates(
+    _: *mut c_void,
+    _: *const c_void,
+    uv: *const [f32; 2],
+    out: *mut [f32; 4],
+) {
+    // SAFETY: the caller passes valid pointers.
+    unsafe { *out = [(*uv)[0], (*uv)[1], 0.0, 1.0] };
+}
+
 static HOST: HostTable = HostTable {
     size: size_of::<HostTable>() as u32,
     abi_minor: resolvent_api::abi::ABI_MINOR,
@@ -199,6 +219,7 @@ static HOST: HostTable = HostTable {
     log: ignore_log,
     fail: ignore_fail,
     parallel_for: one_by_one,
+    texture: coordinates,
 };
 
 #[cfg(test)]

@@ -115,6 +115,7 @@ pub fn scene(path: &Path, a: &Render) -> Outcome<Scene> {
         },
         integrator: PluginBlock::new("pt"),
         lights,
+        textures: IndexMap::new(),
         materials: IndexMap::new(),
         media: IndexMap::from([(
             "volume".to_owned(),

@@ -5,7 +5,8 @@ use crate::failure::{Outcome, input};
 use resolvent_api::PluginKind;
 use resolvent_engine::plugin::Registry;
 use resolvent_scene::{
-    Budget, Environment, Geometry, Light, ParamKind, PluginBlock, PluginDecl, Scene, Value,
+    Budget, Environment, Geometry, ImageSource, Light, ParamKind, PluginBlock, PluginDecl, Scene,
+    Value,
 };
 use serde_json::json;
 use std::fmt::Write;
@@ -53,8 +54,11 @@ pub fn report(path: &Path) -> Outcome<Report> {
     if emitting > 0 {
         row("", format!("{emitting} shapes emit"));
     }
-    for (name, block) in &scene.materials {
-        row("material", format!("{name} ({})", block.plugin));
+    for (name, texture) in &scene.textures {
+        row("texture", format!("{name} ({:?})", texture.image));
+    }
+    for (name, material) in &scene.materials {
+        row("material", format!("{name} ({})", material.block.plugin));
     }
     for (name, medium) in &scene.media {
         row("medium", format!("{name} ({})", medium.block.plugin));
@@ -92,7 +96,8 @@ pub fn report(path: &Path) -> Outcome<Report> {
         "emitting_shapes": emitting,
         "prototypes": scene.prototypes.iter().map(|(n, s)| json!({"name": n, "shapes": s.len()})).collect::<Vec<_>>(),
         "instances": scene.instances.len(),
-        "materials": scene.materials.iter().map(|(n, b)| json!({"name": n, "plugin": b.plugin})).collect::<Vec<_>>(),
+        "textures": scene.textures.iter().map(|(n, t)| json!({"name": n, "image": format!("{:?}", t.image)})).collect::<Vec<_>>(),
+        "materials": scene.materials.iter().map(|(n, m)| json!({"name": n, "plugin": m.block.plugin})).collect::<Vec<_>>(),
         "media": scene.media.iter().map(|(n, m)| json!({"name": n, "plugin": m.block.plugin})).collect::<Vec<_>>(),
         "plugins": plugins.iter().map(|p| json!({"kind": p.kind, "name": p.name, "path": p.found})).collect::<Vec<_>>(),
         "files": files.iter().map(|f| json!({"path": f, "bytes": std::fs::metadata(f).ok().map(|m| m.len())})).collect::<Vec<_>>(),
@@ -183,6 +188,11 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
             add(file);
         }
     }
+    for t in scene.textures.values() {
+        if let ImageSource::File(file) = &t.image {
+            add(file);
+        }
+    }
     for s in scene.all_shapes() {
         if let Geometry::Ply { file, .. } = &s.geometry {
             add(file);
@@ -205,7 +215,10 @@ type Visit<'v> = &'v mut dyn FnMut(&str, &PluginBlock, Option<&PluginDecl>);
 /// Calls `visit` with every plugin block of the scene, its kind, and its declaration if the plugin can be loaded.
 fn walk(scene: &Scene, registry: &Registry, visit: Visit) {
     let integrator = [(PluginKind::Integrator, &scene.integrator)];
-    let materials = scene.materials.values().map(|b| (PluginKind::Bsdf, b));
+    let materials = scene
+        .materials
+        .values()
+        .map(|m| (PluginKind::Bsdf, &m.block));
     let media = scene.media.values().map(|m| (PluginKind::Medium, &m.block));
     for (kind, block) in integrator.into_iter().chain(materials).chain(media) {
         walk_block(scene, registry, kind, block, visit);

@@ -25,7 +25,7 @@ pub const MAGIC: [u8; 8] = *b"RESOLVNT";
 /// Versions must agree exactly.
 pub const ABI_MAJOR: u32 = 1;
 /// The host accepts plugins of any minor version; it reads only what a table's size says is there.
-pub const ABI_MINOR: u32 = 0;
+pub const ABI_MINOR: u32 = 1;
 /// Name of the exported `static` [`PluginHeader`].
 pub const SYMBOL: &str = "resolvent_plugin";
 
@@ -173,6 +173,9 @@ pub enum ParamKind {
     Numbers = 9,
     /// Another plugin, of the kind named in `choices`.
     Plugin = 10,
+    /// Kind of a value, not of a declaration: a texture where [`param_flags::TEXTURABLE`] allows one, to be read with
+    /// [`HostTable::texture`]. Since minor version 1.
+    Texture = 11,
 }
 
 /// Bits of [`ParamDecl::flags`].
@@ -187,6 +190,9 @@ pub mod param_flags {
     pub const ABOVE_MIN: u32 = 8;
     /// The value must stay below `max`.
     pub const BELOW_MAX: u32 = 16;
+    /// It may also be a texture, whose values the host clamps to the range; for `Float` and `Spectrum` of BSDFs. Since minor
+    /// version 1.
+    pub const TEXTURABLE: u32 = 32;
 }
 
 /// Declaration of a parameter.
@@ -219,7 +225,7 @@ pub struct ParamDecl {
 pub struct ParamValue {
     /// Name.
     pub name: Text,
-    /// A [`ParamKind`] as its number: as declared.
+    /// A [`ParamKind`] as its number: as declared, or [`ParamKind::Texture`].
     pub kind: u32,
     /// How many numbers.
     pub count: u32,
@@ -229,7 +235,7 @@ pub struct ParamValue {
     pub text: Text,
     /// The nested plugin's header, or null.
     pub header: *const PluginHeader,
-    /// The nested plugin's instance, owned by the host and alive as long as this one.
+    /// The nested plugin's instance, or the texture; owned by the host and alive as long as this one.
     pub instance: *const c_void,
 }
 
@@ -271,6 +277,15 @@ pub struct HostTable {
     /// Runs `task(data, i)` for all i below `count` on the host's threads and returns when all are done.
     pub parallel_for:
         unsafe extern "C" fn(ctx: *mut c_void, count: usize, task: Task, data: *const c_void),
+    /// Writes red, green, blue and alpha of `texture` (the `instance` of a [`ParamValue`] of the kind [`ParamKind::Texture`]) at
+    /// the texture coordinates `uv` to `out`: linear, clamped to the parameter's range, always finite. It takes no lock and
+    /// allocates nothing. Since minor version 1: there if `size` reaches it.
+    pub texture: unsafe extern "C" fn(
+        ctx: *mut c_void,
+        texture: *const c_void,
+        uv: *const [f32; 2],
+        out: *mut [f32; 4],
+    ),
 }
 
 // SAFETY: the host's functions may be called from any thread.

@@ -23,6 +23,7 @@ pub mod phase;
 pub mod rng;
 pub mod spectrum;
 pub mod surface;
+pub mod texture;
 pub mod tracking;
 pub mod vertex;
 
@@ -42,4 +43,5 @@ pub use params::{Decl, Error, Params};
 pub use phase::PhaseFunction;
 pub use spectrum::{Lanes, Spectrum};
 pub use surface::{Bsdf, SurfacePoint};
+pub use texture::{Textured, TexturedFloat, TexturedSpectrum};
 pub use vertex::{Edge, LightSample, Vertex, VertexKind};

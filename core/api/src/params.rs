@@ -130,6 +130,12 @@ impl Decl {
         self.0.flags |= param_flags::BELOW_MAX;
         self
     }
+    /// It may also be a texture, see [`crate::texture`]; for numbers and spectra of BSDFs. Use
+    /// [`Params::textured_float`] or [`Params::textured_spectrum`].
+    pub const fn texturable(mut self) -> Self {
+        self.0.flags |= param_flags::TEXTURABLE;
+        self
+    }
     /// The declaration.
     pub const fn build(self) -> ParamDecl {
         self.0
@@ -151,7 +157,11 @@ impl<'a> Params<'a> {
         Self { args }
     }
 
-    fn find(&self, name: &str, kind: ParamKind) -> Option<&'a ParamValue> {
+    pub(crate) fn host_table(&self) -> *const HostTable {
+        self.args.host
+    }
+
+    pub(crate) fn find(&self, name: &str, kind: ParamKind) -> Option<&'a ParamValue> {
         if self.args.params.is_null() {
             return None;
         }

@@ -6,6 +6,7 @@
 //! - [`Image::read_exr`], [`Image::write_exr`]: OpenEXR, also files of other programs. [`ExrInfo::read`] reads
 //!   the header alone.
 //! - [`Image::write_png`] with a [`ToneMap`].
+//! - [`Texels`]: PNG, JPEG, Radiance HDR and OpenEXR read in the precision that the file has, for textures.
 //! - [`write_atomically`]: to a temporary name, synced, renamed.
 //! - [`compare()`]: MSE, relative MSE, ratio of means, and a z-test per region.
 //!
@@ -35,6 +36,7 @@ mod exr_read;
 mod exr_write;
 mod image;
 mod png;
+mod texels;
 mod tone;
 
 pub use atomic::write_atomically;
@@ -43,4 +45,5 @@ pub use error::Error;
 pub use exr_info::{ChannelInfo, ExrInfo};
 pub use exr_read::Limits;
 pub use image::{BEAUTY, Channel, Image, Layer};
+pub use texels::{TexelData, Texels};
 pub use tone::{Curve, ToneMap};

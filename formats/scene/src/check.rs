@@ -47,7 +47,7 @@ impl<'d> Checker<'d> {
         }
     }
 
-    fn report_at(&mut self, place: Place, what: impl Into<String>) {
+    pub fn report_at(&mut self, place: Place, what: impl Into<String>) {
         if !self.is_full() {
             self.problems.push(Problem::new(self.file, place, what));
         }
@@ -100,6 +100,12 @@ impl<'d> Checker<'d> {
                     }
                 }
             }
+            Kind::Choice(names) => self.choice(node, names),
+            Kind::Pair => self.numbers(node, 2, "a list of two numbers", COORDINATE),
+            Kind::Factor => match node.data {
+                Data::Number(_) => self.number(node, COORDINATE),
+                _ => self.numbers(node, 3, "a number or a list of three (RGB)", COORDINATE),
+            },
             Kind::Vec3 => self.numbers(node, 3, "a list of three numbers", COORDINATE),
             Kind::Vec3s => self.tuples(node, 3, "a list of three numbers"),
             Kind::Pairs => self.tuples(node, 2, "a list of two numbers"),
@@ -328,6 +334,16 @@ impl<'d> Checker<'d> {
             Data::Null => self.mismatch(node, "a value (leave the key out for the default)"),
             Data::List(items) if is_operations(items) => self.check(node, &Kind::Transform),
             Data::List(items) => items.iter().for_each(|item| self.param(item)),
+            Data::Object(members) if node.get("texture").is_some() => {
+                for member in members {
+                    if &*member.key == "texture" {
+                        self.check(&member.value, &Kind::Name);
+                        continue;
+                    }
+                    let what = format!("a texture's use has no key {}", quoted(&member.key));
+                    self.report_at(self.doc.place_of_key(member), what);
+                }
+            }
             Data::Object(members) => {
                 for member in members
                     .iter()
@@ -342,7 +358,7 @@ impl<'d> Checker<'d> {
                 }
                 match node.get("plugin") {
                     Some(plugin) => self.check(plugin, &Kind::Name),
-                    None => self.report(node, "a nested plugin needs the key \"plugin\": its name"),
+                    None => self.report(node, "a nested plugin needs the key \"plugin\": its name (and a texture's use the key \"texture\")"),
                 }
                 if let Some(params) = node.get("params") {
                     self.check(params, &Kind::Params(""));

@@ -43,6 +43,9 @@ pub struct ParamDecl {
     pub min_excluded: bool,
     /// The largest number itself is excluded.
     pub max_excluded: bool,
+    /// It may also be read from a texture, whose values are clamped to the range; for [`ParamKind::Float`] and
+    /// [`ParamKind::Spectrum`].
+    pub texturable: bool,
     /// Unit, such as `1/m`; may be empty.
     pub unit: String,
     /// One sentence.
@@ -61,6 +64,7 @@ impl ParamDecl {
             max: None,
             min_excluded: false,
             max_excluded: false,
+            texturable: false,
             unit: String::new(),
             help: String::new(),
         }
@@ -216,6 +220,10 @@ fn normalize(value: &Value, decl: &ParamDecl, place: &Place) -> Result<Value, St
     let all = |numbers: Option<Vec<f64>>| {
         numbers.is_some_and(|n| n.iter().all(|x| x.is_finite() && range.contains(*x)))
     };
+    let texture = if decl.texturable { " or a texture" } else { "" };
+    if decl.texturable && value.as_texture().is_some() {
+        return Ok(value.clone());
+    }
     let expected = |ok: bool, what: String| if ok { Ok(value.clone()) } else { Err(what) };
     match &decl.kind {
         ParamKind::Bool => expected(value.as_bool().is_some(), "true or false".into()),
@@ -228,11 +236,11 @@ fn normalize(value: &Value, decl: &ParamDecl, place: &Place) -> Result<Value, St
         }
         ParamKind::Float => expected(
             all(value.as_number().map(|x| vec![x])),
-            format!("a number {range}{unit}"),
+            format!("a number {range}{unit}{texture}"),
         ),
         ParamKind::Spectrum => expected(
             all(value.as_spectrum().map(|v| v.to_vec())),
-            format!("a number {range} or three of them (RGB){unit}"),
+            format!("a number {range} or three of them (RGB){unit}{texture}"),
         ),
         ParamKind::Vec3 => expected(
             all(value.as_vec3().map(|v| v.to_vec())),

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use indexmap::IndexMap;
 
 use crate::plugin::PluginBlock;
+use crate::texture::{NormalMap, Texture};
 use crate::transform::Transform;
 
 /// Three numbers: a point, a direction or an RGB spectrum.
@@ -32,8 +33,10 @@ pub struct Scene {
     pub integrator: PluginBlock,
     /// All lights, except emitting shapes and media.
     pub lights: Vec<Light>,
-    /// Materials (BSDF plugins) by name.
-    pub materials: IndexMap<String, PluginBlock>,
+    /// Images that parameters of materials are read from, by name. One that nothing uses is not read.
+    pub textures: IndexMap<String, Texture>,
+    /// Materials by name.
+    pub materials: IndexMap<String, Material>,
     /// Media by name. A medium that no shape names as its interior stands free.
     pub media: IndexMap<String, Medium>,
     /// All surfaces that stand in the world once.
@@ -353,6 +356,24 @@ pub enum Environment {
         /// Image to world, a rotation.
         rotation: Transform,
     },
+}
+
+/// What surfaces are made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// The BSDF plugin with its parameters.
+    pub block: PluginBlock,
+    /// Turns the shading frame before the BSDF sees it.
+    pub normal_map: Option<NormalMap>,
+}
+
+impl From<PluginBlock> for Material {
+    fn from(block: PluginBlock) -> Material {
+        Material {
+            block,
+            normal_map: None,
+        }
+    }
 }
 
 /// A medium: its plugin and its place.

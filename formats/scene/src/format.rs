@@ -110,8 +110,14 @@ pub(crate) enum Kind {
     Name,
     /// A list of different names out of these.
     Choices(&'static [&'static str]),
+    /// One name out of these.
+    Choice(&'static [&'static str]),
     /// Three coordinates.
     Vec3,
+    /// Two numbers.
+    Pair,
+    /// One number or three, of any sign.
+    Factor,
     /// A list of points or directions.
     Vec3s,
     /// A list of pairs of numbers.
@@ -226,6 +232,11 @@ pub(crate) static SCENE: Object = Object {
                 &RECTANGLE_LIGHT,
             ])),
             "Lights",
+        ),
+        may(
+            "textures",
+            Kind::Named(&Kind::Object(&TEXTURE)),
+            "Images that parameters of materials are read from, by name",
         ),
         may(
             "materials",
@@ -422,6 +433,93 @@ static MATERIAL: Object = Object {
     fields: &[
         PLUGIN,
         may("params", Kind::Params("bsdf"), "Its parameters"),
+        may(
+            "normal_map",
+            Kind::Object(&NORMAL_MAP),
+            "Texture of normals that turns the shading frame",
+        ),
+    ],
+    rules: &[],
+};
+
+static NORMAL_MAP: Object = Object {
+    name: "normal_map",
+    help: "A texture of normals in tangent space: red along dp/du, green along dp/dv, blue along the normal",
+    fields: &[
+        need("texture", Kind::Name, "Name of a texture"),
+        may(
+            "scale",
+            Kind::Number(COORDINATE),
+            "Factor on the components along the surface (1)",
+        ),
+    ],
+    rules: &[],
+};
+
+const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror"]);
+
+static TEXTURE: Object = Object {
+    name: "texture",
+    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one",
+    fields: &[
+        may(
+            "file",
+            Kind::Name,
+            "The image file, relative to the scene file",
+        ),
+        may("data", Kind::Name, "The image file's bytes in base64"),
+        may(
+            "color_space",
+            Kind::Choice(&["auto", "srgb", "linear", "raw"]),
+            "What its numbers mean; auto is srgb for 8 and 16 bits, linear for floating point (auto)",
+        ),
+        may("wrap", WRAP, "What lies beyond its edges (repeat)"),
+        may("wrap_u", WRAP, "The same, left and right"),
+        may("wrap_v", WRAP, "The same, below and above"),
+        may(
+            "filter",
+            Kind::Choice(&["bilinear", "nearest"]),
+            "What lies between its texels (bilinear)",
+        ),
+        may(
+            "channel",
+            Kind::Choice(&["r", "g", "b", "a"]),
+            "The channel that is used alone",
+        ),
+        may(
+            "scale",
+            Kind::Factor,
+            "Factor on its values: one number or RGB (1)",
+        ),
+        may(
+            "bias",
+            Kind::Factor,
+            "Added after the factor: one number or RGB (0)",
+        ),
+        may(
+            "uv_transform",
+            Kind::Object(&UV_TRANSFORM),
+            "From the surface's coordinates to the image's",
+        ),
+    ],
+    rules: &[
+        Rule::ExactlyOne(&["file", "data"]),
+        Rule::AtMostOne(&["wrap", "wrap_u"]),
+        Rule::AtMostOne(&["wrap", "wrap_v"]),
+    ],
+};
+
+static UV_TRANSFORM: Object = Object {
+    name: "uv_transform",
+    help: "Scaled, then rotated, then moved",
+    fields: &[
+        may("scale", Kind::Pair, "Factors on u and v ([1, 1])"),
+        may(
+            "rotation_deg",
+            Kind::Number(Range::closed(-1e6, 1e6)),
+            "Rotation of the coordinates, counter-clockwise (0)",
+        ),
+        may("offset", Kind::Pair, "Added at the end ([0, 0])"),
     ],
     rules: &[],
 };

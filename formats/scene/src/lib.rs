@@ -41,6 +41,7 @@
 //! `[{"scale": 2}, {"rotate_deg": {"axis": [0, 1, 0], "angle": 30}}, {"translate": [0, 1, 0]}]`.
 //! Unknown and repeated keys are errors.
 
+mod base64;
 mod check;
 pub mod declare;
 mod describe;
@@ -51,7 +52,9 @@ mod nearest;
 mod parse;
 mod plugin;
 mod read;
+mod read_texture;
 mod schema;
+mod texture;
 mod transform;
 mod write;
 
@@ -63,4 +66,8 @@ pub use indexmap::IndexMap;
 pub use nearest::nearest;
 pub use plugin::{Param, PluginBlock, Value};
 pub use schema::schema;
+pub use texture::{
+    ColorSpace, ImageSource, MemoryImage, NormalMap, Texture, TextureChannel, TextureFilter,
+    UvTransform, Wrap,
+};
 pub use transform::Transform;

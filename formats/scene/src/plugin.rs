@@ -40,6 +40,8 @@ pub enum Value {
     List(Vec<Value>),
     /// A nested plugin.
     Object(PluginBlock),
+    /// The texture of this name, see [`crate::Scene::textures`].
+    Texture(String),
 }
 
 impl PluginBlock {
@@ -71,6 +73,22 @@ impl PluginBlock {
             || [".so", ".dylib", ".dll"]
                 .iter()
                 .any(|end| name.ends_with(end))
+    }
+}
+
+impl PluginBlock {
+    /// The textures that this block and the plugins nested in it name, with the places of the parameters.
+    pub fn textures(&self) -> Vec<(&str, &Place)> {
+        let mut out = Vec::new();
+        // Blocks nest as deep as the file does, which the JSON reader bounds.
+        for param in self.params.values() {
+            match &param.value {
+                Value::Texture(name) => out.push((name.as_str(), &param.place)),
+                Value::Object(block) => out.extend(block.textures()),
+                _ => {}
+            }
+        }
+        out
     }
 }
 
@@ -141,6 +159,14 @@ impl Value {
         }
     }
 
+    /// The name of the texture that the value is read from.
+    pub fn as_texture(&self) -> Option<&str> {
+        match self {
+            Value::Texture(name) => Some(name),
+            _ => None,
+        }
+    }
+
     /// What an error message says was found.
     pub(crate) fn found(&self) -> String {
         match self {
@@ -152,6 +178,7 @@ impl Value {
             Value::Object(block) => {
                 format!("the plugin block {}", crate::json::quoted(&block.plugin))
             }
+            Value::Texture(name) => format!("the texture {}", crate::json::quoted(name)),
         }
     }
 }

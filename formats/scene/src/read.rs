@@ -79,8 +79,8 @@ fn check_version(doc: &Document<'_>, file: &Path) -> Result<(), Error> {
 /// than text.
 const MAX_PARAMS: usize = 200_000;
 
-struct Reader<'d> {
-    checker: Checker<'d>,
+pub(crate) struct Reader<'d> {
+    pub(crate) checker: Checker<'d>,
     params: usize,
 }
 
@@ -109,7 +109,8 @@ impl Reader<'_> {
                 .iter()
                 .map(|n| self.light(n))
                 .collect::<Option<_>>()?,
-            materials: named(root, "materials", |n| self.block(n))?,
+            textures: named(root, "textures", |n| self.texture(n))?,
+            materials: named(root, "materials", |n| self.material(n))?,
             media: named(root, "media", |n| self.medium(n))?,
             shapes: self.shapes(list(root, "shapes"))?,
             prototypes: named(root, "prototypes", |n| {
@@ -127,8 +128,11 @@ impl Reader<'_> {
         Some(scene)
     }
 
-    /// Reports names of materials, media and prototypes that nothing has.
+    /// Reports names of textures, materials, media and prototypes that nothing has.
     fn references(&mut self, root: &Node, scene: &Scene) {
+        for (node, material) in members(root, "materials").zip(scene.materials.values()) {
+            self.known_textures(node, material, &scene.textures);
+        }
         let prototypes = match root.get("prototypes").map(|n| &n.data) {
             Some(Data::Object(members)) => members.as_slice(),
             _ => &[],
@@ -501,7 +505,7 @@ impl Reader<'_> {
         Some(mesh)
     }
 
-    fn block(&mut self, node: &Node) -> Option<PluginBlock> {
+    pub(crate) fn block(&mut self, node: &Node) -> Option<PluginBlock> {
         let params = match node.get("params").map(|n| &n.data) {
             Some(Data::Object(members)) => members
                 .iter()
@@ -550,7 +554,10 @@ impl Reader<'_> {
             }
             Data::Object(_) => {
                 self.count(node)?;
-                Value::Object(self.block(node)?)
+                match text(node, "texture") {
+                    Some(name) => Value::Texture(name.into()),
+                    None => Value::Object(self.block(node)?),
+                }
             }
         })
     }
@@ -593,6 +600,15 @@ fn instance(node: &Node) -> Option<Instance> {
     })
 }
 
+/// The values of an object with names as keys.
+fn members<'n>(node: &'n Node, key: &str) -> impl Iterator<Item = &'n Node> {
+    let members = match node.get(key).map(|n| &n.data) {
+        Some(Data::Object(members)) => &members[..],
+        _ => &[],
+    };
+    members.iter().map(|m| &m.value)
+}
+
 fn list<'n>(node: &'n Node, key: &str) -> &'n [Node] {
     node.get(key).map_or(&[], items)
 }
@@ -604,7 +620,7 @@ fn items(node: &Node) -> &[Node] {
     }
 }
 
-fn number(node: &Node, key: &str) -> Option<f64> {
+pub(crate) fn number(node: &Node, key: &str) -> Option<f64> {
     match node.get(key)?.data {
         Data::Number(x) => Some(x),
         _ => None,
@@ -618,14 +634,14 @@ fn flag(node: &Node, key: &str) -> Option<bool> {
     }
 }
 
-fn text<'n>(node: &'n Node, key: &str) -> Option<&'n str> {
+pub(crate) fn text<'n>(node: &'n Node, key: &str) -> Option<&'n str> {
     match &node.get(key)?.data {
         Data::Text(t) => Some(t),
         _ => None,
     }
 }
 
-fn floats<const N: usize>(node: &Node) -> Option<[f64; N]> {
+pub(crate) fn floats<const N: usize>(node: &Node) -> Option<[f64; N]> {
     let Data::List(items) = &node.data else {
         return None;
     };
@@ -643,7 +659,7 @@ fn vec3(node: &Node, key: &str) -> Option<Vec3> {
     floats(node.get(key)?)
 }
 
-fn spectrum(node: &Node, key: &str) -> Option<Vec3> {
+pub(crate) fn spectrum(node: &Node, key: &str) -> Option<Vec3> {
     number(node, key)
         .map(|x| [x; 3])
         .or_else(|| vec3(node, key))

@@ -26,7 +26,16 @@ pub fn schema(decls: &[PluginDecl]) -> Json {
                 {"type": "array", "items": {"$ref": "#/$defs/value"}},
                 {"$ref": "#/$defs/transform"},
                 {"$ref": "#/$defs/plugin"},
+                {"$ref": "#/$defs/texture"},
             ]
+        }),
+    );
+    builder.defs.insert(
+        "texture".into(),
+        json!({
+            "type": "object", "description": "A texture of the scene, by name",
+            "required": ["texture"], "additionalProperties": false,
+            "properties": {"texture": {"type": "string", "minLength": 1}},
         }),
     );
     // A block as the value of a parameter whose plugin kind is not known.
@@ -68,6 +77,9 @@ impl Builder<'_> {
             Kind::Choices(names) => {
                 json!({"type": "array", "items": {"enum": names}, "uniqueItems": true})
             }
+            Kind::Choice(names) => json!({"enum": names}),
+            Kind::Pair => numbers(2, COORDINATE),
+            Kind::Factor => json!({"anyOf": [number(COORDINATE), numbers(3, COORDINATE)]}),
             Kind::Vec3 => numbers(3, COORDINATE),
             Kind::Vec3s => json!({"type": "array", "items": numbers(3, COORDINATE)}),
             Kind::Pairs => json!({"type": "array", "items": numbers(2, COORDINATE)}),
@@ -220,6 +232,9 @@ impl Builder<'_> {
             }
             ParamKind::Numbers => json!({"type": "array", "items": number(range)}),
         };
+        if p.texturable {
+            out = json!({"anyOf": [out, {"$ref": "#/$defs/texture"}]});
+        }
         let unit = if p.unit.is_empty() {
             String::new()
         } else {

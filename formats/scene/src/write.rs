@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value as Json, json};
 
+use crate::base64;
 use crate::declare::{ParamKind, PluginDecl};
 use crate::describe::*;
 use crate::error::Error;
 use crate::format::VERSION;
 use crate::plugin::{PluginBlock, Value};
+use crate::texture::*;
 use crate::transform::Transform;
 
 impl Scene {
@@ -66,9 +68,14 @@ impl Scene {
             }
         }
         rebase.block(&mut self.integrator);
+        for texture in self.textures.values_mut() {
+            if let ImageSource::File(file) = &mut texture.image {
+                rebase.path(file);
+            }
+        }
         self.materials
             .values_mut()
-            .for_each(|block| rebase.block(block));
+            .for_each(|m| rebase.block(&mut m.block));
         self.media
             .values_mut()
             .for_each(|medium| rebase.block(&mut medium.block));
@@ -86,10 +93,18 @@ impl Scene {
         root["sampling"] = sampling(&self.sampling);
         root["integrator"] = block(&self.integrator);
         root["lights"] = self.lights.iter().map(light).collect();
+        if !self.textures.is_empty() {
+            root["textures"] = Json::Object(
+                self.textures
+                    .iter()
+                    .map(|(name, t)| (name.clone(), texture(t)))
+                    .collect(),
+            );
+        }
         root["materials"] = Json::Object(
             self.materials
                 .iter()
-                .map(|(name, b)| (name.clone(), block(b)))
+                .map(|(name, m)| (name.clone(), material(m)))
                 .collect(),
         );
         root["media"] = Json::Object(
@@ -309,7 +324,43 @@ pub(crate) fn value(v: &Value) -> Json {
         Value::Text(t) => json!(t),
         Value::List(items) => items.iter().map(value).collect(),
         Value::Object(b) => block(b),
+        Value::Texture(name) => json!({"texture": name}),
     }
+}
+
+fn texture(t: &Texture) -> Json {
+    let mut out = match &t.image {
+        ImageSource::File(file) => json!({"file": file}),
+        ImageSource::Memory(image) => json!({"data": base64::encode(&image.bytes)}),
+    };
+    out["color_space"] = json!(word(&COLOR_SPACES, t.color_space));
+    let [u, v] = t.wrap.map(|w| word(&WRAPS, w));
+    if u == v {
+        out["wrap"] = json!(u);
+    } else {
+        out["wrap_u"] = json!(u);
+        out["wrap_v"] = json!(v);
+    }
+    out["filter"] = json!(word(&FILTERS, t.filter));
+    if let Some(channel) = t.channel {
+        out["channel"] = json!(word(&CHANNELS, channel));
+    }
+    out["scale"] = spectrum(t.scale);
+    out["bias"] = spectrum(t.bias);
+    if t.uv != UvTransform::default() {
+        out["uv_transform"] = json!({
+            "scale": t.uv.scale, "rotation_deg": t.uv.rotation_deg, "offset": t.uv.offset,
+        });
+    }
+    out
+}
+
+fn material(m: &Material) -> Json {
+    let mut out = block(&m.block);
+    if let Some(map) = &m.normal_map {
+        out["normal_map"] = json!({"texture": map.texture, "scale": map.scale});
+    }
+    out
 }
 
 fn medium(m: &Medium) -> Json {

@@ -100,12 +100,12 @@ fn every_key_arrives() {
     ));
 
     assert_eq!(
-        s.materials["floor"].params["reflectance"]
+        s.materials["floor"].block.params["reflectance"]
             .value
             .as_spectrum(),
         Some([0.6, 0.55, 0.5])
     );
-    assert!(s.materials["with a blank"].is_path() && !s.materials["floor"].is_path());
+    assert!(s.materials["with a blank"].block.is_path() && !s.materials["floor"].block.is_path());
     let cloud = &s.media["cloud"];
     let phase = cloud.block.params["phase"].value.as_plugin().unwrap();
     assert_eq!(
@@ -318,7 +318,7 @@ fn files_are_written_read_and_moved() {
         Some("sub/cloud.vdb")
     );
     assert_eq!(
-        moved.materials["with a blank"].plugin,
+        moved.materials["with a blank"].block.plugin,
         "sub/./my/libglass.so"
     );
     assert_eq!(moved.resolve(file), dir.join("sub/bunny.ply"));

@@ -115,7 +115,7 @@ fn reads(text: &str) -> bool {
         return false;
     };
     let mut blocks = vec![("integrator", scene.integrator.clone())];
-    blocks.extend(scene.materials.values().map(|b| ("bsdf", b.clone())));
+    blocks.extend(scene.materials.values().map(|m| ("bsdf", m.block.clone())));
     blocks.extend(scene.media.values().map(|m| ("medium", m.block.clone())));
     while let Some((kind, block)) = blocks.pop() {
         if let Some(decl) = decls()

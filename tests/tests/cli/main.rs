@@ -8,5 +8,6 @@ mod interrupt;
 mod program;
 mod render;
 mod stats;
+mod textures;
 mod tools;
 mod volume;

@@ -97,7 +97,9 @@ fn layouts_agree() {
         "param": ParamValue {
             "kind" = kind, "count" = count, "numbers" = numbers, "text" = text, "header" = header, "instance" = instance
         },
-        "host": HostTable { "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for },
+        "host": HostTable {
+            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture
+        },
         "create_args": CreateArgs { "params" = params, "host" = host, "to_world" = to_world, "lanes" = lanes },
         "scatter_draws": ScatterDraws {},
         "scatter_eval": ScatterEval { "forward" = forward },

@@ -248,6 +248,15 @@ impl Accel {
         }
     }
 
+    /// True where texture coordinates run clockwise seen from outside: ∂p/∂v is on the other side of ∂p/∂u than ng × ∂p/∂u.
+    pub fn uv_mirrored(&self, shape: u32, prim: u32) -> bool {
+        let placed = self
+            .instances
+            .as_ref()
+            .and_then(|all| all.uv_mirrored(shape, prim));
+        placed.unwrap_or_else(|| self.geometry.uv_mirrored(shape, prim))
+    }
+
     /// [`Accel::closest_with`] for a scene with instances: first the shapes that stand by themselves, then the instances up to there.
     #[inline(never)]
     fn closest_of_all(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {

@@ -85,6 +85,12 @@ impl Place {
         Vec3::from_array(self.translation).as_dvec3()
     }
 
+    /// True if the transform turns right hands into left ones.
+    pub fn mirrors(&self) -> bool {
+        let [a, b, c] = self.linear().map(DVec3::from);
+        a.cross(b).dot(c) < 0.0
+    }
+
     /// What a rounding of `size` in object space is in the world.
     fn outward(&self, size: DVec3) -> DVec3 {
         times(&self.linear.map(|r| r.map(|x| f64::from(x.abs()))), size)

@@ -54,6 +54,21 @@ impl Geometry {
     }
 }
 
+impl Geometry {
+    /// True where texture coordinates run clockwise seen from outside: ∂p/∂v is on the other side of ∂p/∂u than ng × ∂p/∂u.
+    pub fn uv_mirrored(&self, shape: u32, prim: u32) -> bool {
+        match &self.shapes[shape as usize] {
+            Shape::Mesh(m) if !m.uvs.is_empty() => {
+                let [a, b, c] = m.indices[prim as usize].map(|i| m.uvs[i as usize].as_dvec2());
+                (b - a).perp_dot(c - a) < 0.0
+            }
+            // θ runs from the north pole to the south.
+            Shape::Sphere(_) => true,
+            _ => false,
+        }
+    }
+}
+
 /// Distance that points keep from the edges of their triangle, in units of their rounding error summed over the axes. Moving a ray's
 /// origin off the triangle takes up to 3 of them; at an edge of angle φ it then is on the right side of the neighbour, too, if
 /// sin φ times this is more than that: for all but the sharpest edges.

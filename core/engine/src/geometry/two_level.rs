@@ -143,6 +143,14 @@ impl Instances {
         })
     }
 
+    /// [`Geometry::uv_mirrored`] of a shape of an instance; `None` if it is on none.
+    pub fn uv_mirrored(&self, shape: u32, prim: u32) -> Option<bool> {
+        let (instance, shape) = self.decode(shape)?;
+        let place = self.places.get(instance as usize)?;
+        let prototype = self.prototypes[place.prototype as usize].as_ref()?;
+        Some(prototype.geometry.uv_mirrored(shape, prim) != place.mirrors())
+    }
+
     /// The box of the whole, as (min, max).
     pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
         self.top.bounds()

@@ -36,7 +36,7 @@ pub(super) fn declaration(header: &PluginHeader, kind: PluginKind) -> Result<Plu
                 .add(i * header.param_size as usize)
                 .cast::<abi::ParamDecl>()
         };
-        params.push(parameter(raw)?);
+        params.push(parameter(raw, kind)?);
     }
     Ok(PluginDecl {
         name,
@@ -52,7 +52,7 @@ fn text(t: Text) -> String {
     unsafe { t.to_owned() }
 }
 
-fn parameter(raw: &abi::ParamDecl) -> Result<ParamDecl, String> {
+fn parameter(raw: &abi::ParamDecl, of: PluginKind) -> Result<ParamDecl, String> {
     let name = text(raw.name);
     let choices = text(raw.choices);
     let kind = match raw.kind {
@@ -87,6 +87,13 @@ fn parameter(raw: &abi::ParamDecl) -> Result<ParamDecl, String> {
         ),
     };
     let has = |flag: u32| raw.flags & flag != 0;
+    let texturable = has(param_flags::TEXTURABLE);
+    let varies = matches!(kind, ParamKind::Float | ParamKind::Spectrum);
+    if texturable && !(varies && of == PluginKind::Bsdf) {
+        return Err(format!(
+            "declares that '{name}' may be textured: only numbers and spectra of BSDFs may"
+        ));
+    }
     Ok(ParamDecl {
         name,
         kind,
@@ -96,6 +103,7 @@ fn parameter(raw: &abi::ParamDecl) -> Result<ParamDecl, String> {
         max: has(param_flags::MAX).then_some(raw.max),
         min_excluded: has(param_flags::ABOVE_MIN),
         max_excluded: has(param_flags::BELOW_MAX),
+        texturable,
         unit: text(raw.unit),
         help: text(raw.help),
     })

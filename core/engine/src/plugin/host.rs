@@ -1,5 +1,6 @@
 //! The host's side of the services plugins may call.
 
+use crate::texture::Binding;
 use rayon::prelude::*;
 use resolvent_api::abi::{ABI_MINOR, HostTable, Task, Text};
 use std::cell::RefCell;
@@ -61,7 +62,19 @@ pub(super) static HOST: HostTable = HostTable {
     log,
     fail,
     parallel_for,
+    texture,
 };
+
+/// No lock and no allocation: what it reads was made before the instance that holds the handle.
+unsafe extern "C" fn texture(
+    _: *mut c_void,
+    texture: *const c_void,
+    uv: *const [f32; 2],
+    out: *mut [f32; 4],
+) {
+    // SAFETY: the plugin passes a handle that its instance was made with, which keeps the binding alive, and valid pointers.
+    unsafe { *out = (*texture.cast::<Binding>()).at(*uv) };
+}
 
 unsafe extern "C" fn log(_: *mut c_void, level: u32, message: Text) {
     // SAFETY: the plugin passes a text valid for the call.

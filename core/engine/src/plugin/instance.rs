@@ -3,6 +3,7 @@
 use super::host::{HOST, pending_failure, take_failure, warn};
 use super::load::Plugin;
 use crate::error::{Error, Result};
+use crate::texture::Binding;
 use resolvent_api::Affine;
 use resolvent_api::abi::{self, CreateArgs, ParamValue, PluginKind, Text};
 use resolvent_scene::{Checked, ParamKind, Place, PluginBlock, Problem, Value};
@@ -16,6 +17,8 @@ pub struct Instance {
     pub plugin: Arc<Plugin>,
     /// Nested instances by parameter name, in order of declaration.
     pub nested: Vec<(String, Arc<Instance>)>,
+    /// The textures that the plugin holds handles to.
+    _textures: Vec<(String, Box<Binding>)>,
     pub(super) pointer: *mut c_void,
     /// Scene file and place of the block that it was made from.
     pub(super) at: (PathBuf, Place),
@@ -35,14 +38,16 @@ struct Marshalled {
 
 impl Instance {
     /// Makes an instance from parameters checked against the plugin's declaration. `nested` are the instances of its
-    /// `Plugin` parameters.
+    /// `Plugin` parameters, `textures` those of the parameters that are read from one.
     ///
     /// # Errors
     /// What the plugin says, with the place of its block in the scene.
+    #[allow(clippy::too_many_arguments)]
     pub fn create(
         plugin: Arc<Plugin>,
         checked: &Checked,
         nested: Vec<(String, Arc<Instance>)>,
+        textures: Vec<(String, Box<Binding>)>,
         to_world: &Affine,
         lanes: u32,
         scene: &dyn Fn(&str) -> std::path::PathBuf,
@@ -69,14 +74,25 @@ impl Instance {
                 .iter()
                 .find(|(name, _)| *name == decl.name)
                 .map(|(_, n)| n);
+            let texture = textures
+                .iter()
+                .find(|(name, _)| *name == decl.name)
+                .map(|(_, t)| t.handle());
+            let kind = match texture {
+                Some(_) => abi::ParamKind::Texture,
+                None => kind(&decl.kind),
+            };
             values.push(ParamValue {
                 name: Text::new(&decl.name),
-                kind: kind(&decl.kind) as u32,
+                kind: kind as u32,
                 count: store.numbers[i].len() as u32,
                 numbers: store.numbers[i].as_ptr(),
                 text: Text::new(&store.texts[i]),
                 header: inner.map_or(std::ptr::null(), |n| n.plugin.header),
-                instance: inner.map_or(std::ptr::null(), |n| n.pointer.cast_const()),
+                instance: inner
+                    .map(|n| n.pointer.cast_const())
+                    .or(texture)
+                    .unwrap_or(std::ptr::null()),
             });
         }
         let args = CreateArgs {
@@ -100,6 +116,7 @@ impl Instance {
         Ok(Self {
             plugin,
             nested,
+            _textures: textures,
             pointer,
             at: (at.0.to_path_buf(), at.1.clone()),
         })

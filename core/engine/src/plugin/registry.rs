@@ -3,8 +3,9 @@
 use super::instance::{Instance, nested_blocks};
 use super::load::Plugin;
 use crate::error::{Error, Result};
+use crate::texture::{Binding, Textures};
 use resolvent_api::{Affine, PluginKind};
-use resolvent_scene::{PluginBlock, Problem, Scene, nearest};
+use resolvent_scene::{Checked, PluginBlock, Problem, Scene, nearest};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -192,6 +193,22 @@ impl Registry {
         to_world: &Affine,
         lanes: u32,
     ) -> Result<Instance> {
+        self.instantiate_textured(kind, block, scene, to_world, lanes, &Textures::new())
+    }
+
+    /// The same for plugins whose parameters may be textured, with the textures of the scene.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the block or the images it needs, with its place in the scene.
+    pub fn instantiate_textured(
+        &self,
+        kind: PluginKind,
+        block: &PluginBlock,
+        scene: &Scene,
+        to_world: &Affine,
+        lanes: u32,
+        textures: &Textures,
+    ) -> Result<Instance> {
         let file = scene.source.file.as_path();
         let placed = |e: Error| match e {
             Error::Plugin(why) => Error::from(Problem::new(file, block.place.clone(), why)),
@@ -215,18 +232,52 @@ impl Registry {
                         plugin.title()
                     ))
                 })?;
-            let instance = self.instantiate(kind, inner, scene, to_world, lanes)?;
+            let instance =
+                self.instantiate_textured(kind, inner, scene, to_world, lanes, textures)?;
             nested.push((name, Arc::new(instance)));
         }
         let resolve = |p: &str| scene.resolve(p);
+        let bound = bindings(&plugin, &checked, scene, textures)?;
         Instance::create(
             plugin,
             &checked,
             nested,
+            bound,
             to_world,
             lanes,
             &resolve,
             (file, &block.place),
         )
     }
+}
+
+/// The textures among checked parameters, each with its parameter's range.
+fn bindings(
+    plugin: &Plugin,
+    checked: &Checked,
+    scene: &Scene,
+    textures: &Textures,
+) -> Result<Vec<(String, Box<Binding>)>> {
+    let mut out = Vec::new();
+    for decl in &plugin.decl.params {
+        let Some(name) = checked
+            .params
+            .get(&decl.name)
+            .and_then(|p| p.value.as_texture())
+        else {
+            continue;
+        };
+        let mut min = decl.min.map_or(f32::MIN, |v| v as f32);
+        let mut max = decl.max.map_or(f32::MAX, |v| v as f32);
+        // An excluded end is out of range itself.
+        if decl.min_excluded {
+            min = min.next_up();
+        }
+        if decl.max_excluded {
+            max = max.next_down();
+        }
+        let texture = textures.get(name, scene)?;
+        out.push((decl.name.clone(), Box::new(Binding::new(texture, min, max))));
+    }
+    Ok(out)
 }

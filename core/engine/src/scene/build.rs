@@ -3,13 +3,14 @@
 use super::instances::{Copies, Groups, emits};
 use super::interiors::{Collected, Interior, Interiors};
 use super::shapes::{Wide, affine};
-use super::{Material, PlacedMedium, Surface};
+use super::{Material, NormalMap, PlacedMedium, Surface};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
 use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights, Spot, SunSky};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
+use crate::texture::{ReadImage, Textures};
 use glam::{DMat3, DVec3};
 use resolvent_api::abi::scene_traits;
 use resolvent_api::medium::medium_traits;
@@ -56,6 +57,8 @@ pub struct Scene {
     pub lanes: u32,
     /// The point of the world that is the origin of everything here.
     pub centre: DVec3,
+    /// The images that textures in use were read from.
+    pub textures: Vec<ReadImage>,
     /// What building took.
     pub preparation: Preparation,
 }
@@ -78,6 +81,7 @@ impl Scene {
         let centre = centre(scene, &wide, &groups, camera_to_world.translation);
         let to_local = Affine::from_translation(-centre);
 
+        let textures = Textures::new();
         let mut materials = Vec::new();
         let mut media_of: Vec<Option<u32>> = vec![None; scene.media.len()];
         let mut media = Vec::new();
@@ -124,7 +128,14 @@ impl Scene {
         // What stands behind a shape, emission aside; the material of an instance replaces its own.
         let mut behind = |described: &describe::Shape, replaced: Option<&str>| -> Result<Surface> {
             let material = match replaced.or(described.material.as_deref()) {
-                Some(name) => Some(material(name, scene, registry, lanes, &mut materials)?),
+                Some(name) => Some(material(
+                    name,
+                    scene,
+                    registry,
+                    lanes,
+                    &textures,
+                    &mut materials,
+                )?),
                 None => None,
             };
             let ior = material.map_or(1.0, |m| materials[m as usize].bsdf.ior());
@@ -295,6 +306,7 @@ impl Scene {
             traits,
             lanes,
             centre,
+            textures: textures.read(),
             preparation: Preparation {
                 media_seconds,
                 geometry_seconds,
@@ -339,21 +351,36 @@ fn material(
     scene: &describe::Scene,
     registry: &Registry,
     lanes: u32,
+    textures: &Textures,
     materials: &mut Vec<Material>,
 ) -> Result<u32> {
     if let Some(i) = materials.iter().position(|m| m.name == name) {
         return Ok(i as u32);
     }
-    let block = scene
+    let described = scene
         .materials
         .get(name)
         .ok_or_else(|| Error::Input(format!("there is no material '{name}' in the scene")))?;
-    let instance =
-        registry.instantiate(PluginKind::Bsdf, block, scene, &Affine::IDENTITY, lanes)?;
+    let instance = registry.instantiate_textured(
+        PluginKind::Bsdf,
+        &described.block,
+        scene,
+        &Affine::IDENTITY,
+        lanes,
+        textures,
+    )?;
     let bsdf = ForeignBsdf::new(Arc::new(instance))?;
+    let normal_map = match &described.normal_map {
+        Some(map) => Some(NormalMap::new(
+            textures.get(&map.texture, scene)?,
+            map.scale,
+        )),
+        None => None,
+    };
     materials.push(Material {
         name: name.to_owned(),
         bsdf,
+        normal_map,
     });
     Ok(materials.len() as u32 - 1)
 }

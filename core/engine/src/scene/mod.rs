@@ -4,11 +4,13 @@ mod build;
 mod instances;
 mod interiors;
 mod media;
+mod normal_map;
 mod shapes;
 mod transport;
 mod view;
 
 pub use build::{Preparation, Scene};
+pub use normal_map::NormalMap;
 pub use view::{Counters, View};
 
 use crate::plugin::{ForeignBsdf, ForeignMedium};
@@ -56,6 +58,8 @@ pub struct Material {
     pub name: String,
     /// Its BSDF.
     pub bsdf: ForeignBsdf,
+    /// Turns the shading frame before the BSDF sees it.
+    pub normal_map: Option<NormalMap>,
 }
 
 /// A medium of the scene.

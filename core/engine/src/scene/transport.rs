@@ -330,6 +330,12 @@ impl View<'_> {
             return Ok(next.flags & vertex_flags::EMITS != 0);
         };
         let material = &self.scene.materials[material as usize];
+        if let Some(map) = &material.normal_map
+            && let Some(accel) = &self.scene.accel
+        {
+            let mirrored = accel.uv_mirrored(at.shape, at.prim);
+            next.frame = map.turn(&next.frame, at.ng, next.uv, mirrored);
+        }
         let point = BsdfPoint {
             p: next.p,
             ng: next.ng,

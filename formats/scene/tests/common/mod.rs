@@ -118,6 +118,7 @@ pub fn decls() -> Vec<PluginDecl> {
             "diffuse",
             vec![param("reflectance", ParamKind::Spectrum, |p| {
                 unit(p);
+                p.texturable = true;
                 p.default = Some(Value::Number(0.5));
             })],
         ),

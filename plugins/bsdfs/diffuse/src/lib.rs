@@ -2,7 +2,7 @@
 //!
 //! | name | type | unit | default | range | meaning |
 //! |---|---|---|---|---|---|
-//! | `reflectance` | spectrum | | 0.5 | [0, 1] | share of the incident power that is reflected |
+//! | `reflectance` | spectrum or texture | | 0.5 | [0, 1] | share of the incident power that is reflected |
 //!
 //! f = ρ/π where `wo` and `wi` lie on the same side of the surface, 0 elsewhere; nothing is transmitted. Directions are sampled
 //! with the density |cos θ|/π, so the weight of a sample is ρ.
@@ -20,12 +20,18 @@ use resolvent_api::operator::{Measure, lobes};
 use resolvent_api::surface::bsdf_traits;
 use resolvent_api::{
     Bsdf, Decl, Error, Mode, ParamDecl, Params, Plugin, Scatter, ScatterDraws, ScatterEval,
-    ScatterSample, Spectrum, SurfacePoint, Vec3,
+    ScatterSample, Spectrum, SurfacePoint, TexturedSpectrum, Vec3,
 };
 
-/// The plugin, and its own closure: the reflectance is the same everywhere.
-#[derive(Clone, Copy, Debug)]
+/// The plugin.
+#[derive(Debug)]
 pub struct Diffuse {
+    reflectance: TexturedSpectrum,
+}
+
+/// The BSDF at one point.
+#[derive(Clone, Copy, Debug)]
+pub struct Lambert {
     reflectance: Spectrum,
 }
 
@@ -39,29 +45,37 @@ impl Plugin for Diffuse {
     .default("0.5")
     .at_least(0.0)
     .at_most(1.0)
+    .texturable()
     .build()];
 
     fn create(params: &Params<'_>) -> Result<Self, Error> {
         let reflectance = params
-            .spectrum("reflectance")
+            .textured_spectrum("reflectance")?
             .ok_or_else(|| Error::new("the parameter 'reflectance' has no value"))?;
         Ok(Self { reflectance })
     }
 }
 
 impl Bsdf for Diffuse {
-    type Closure = Self;
+    type Closure = Lambert;
 
     fn traits(&self) -> u32 {
-        bsdf_traits::UNIFORM
+        if self.reflectance.is_constant() {
+            bsdf_traits::UNIFORM
+        } else {
+            0
+        }
     }
 
-    fn closure(&self, _: &SurfacePoint) -> Self {
-        *self
+    #[inline]
+    fn closure(&self, at: &SurfacePoint) -> Lambert {
+        Lambert {
+            reflectance: self.reflectance.at(at),
+        }
     }
 }
 
-impl Diffuse {
+impl Lambert {
     /// A black surface samples nothing, and its densities say so: a walk ends there without a wasted ray.
     #[inline(always)]
     fn is_black(&self) -> bool {
@@ -69,7 +83,7 @@ impl Diffuse {
     }
 }
 
-impl Scatter for Diffuse {
+impl Scatter for Lambert {
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3, _: Mode) -> ScatterEval {
         if !(wo.z * wi.z > 0.0) || self.is_black() {

@@ -1,0 +1,419 @@
+//! A texture: decoded texels with the settings of a scene's texture, looked up at texture coordinates.
+
+use super::srgb;
+use resolvent_image::{TexelData, Texels};
+use resolvent_scene::{self as describe, ColorSpace, TextureChannel, TextureFilter, Wrap};
+use std::sync::Arc;
+
+/// How the numbers of an image become linear ones; alpha is linear already.
+#[derive(Clone, Copy)]
+enum Curve {
+    /// They are.
+    None,
+    /// By a table with one entry per code.
+    Table(&'static [f32]),
+    /// By the formula, for floating-point images.
+    Formula,
+}
+
+/// An image and how it is read.
+pub struct Texture {
+    texels: Arc<Texels>,
+    curve: Curve,
+    wrap: [Wrap; 2],
+    nearest: bool,
+    channel: Option<usize>,
+    scale: [f32; 3],
+    bias: [f32; 3],
+    /// Rows of the map from the surface's coordinates to the image's.
+    uv: [[f32; 3]; 2],
+}
+
+impl Texture {
+    /// The image `texels` with the settings of `t`.
+    pub fn new(texels: Arc<Texels>, t: &describe::Texture) -> Self {
+        let srgb = match t.color_space {
+            ColorSpace::Auto => !texels.data.is_float(),
+            ColorSpace::Srgb => true,
+            ColorSpace::Linear => false,
+        };
+        let curve = match (&texels.data, srgb) {
+            (_, false) => Curve::None,
+            (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
+            (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
+            (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
+        };
+        Self {
+            texels,
+            curve,
+            wrap: t.wrap,
+            nearest: t.filter == TextureFilter::Nearest,
+            channel: t.channel.map(|c| match c {
+                TextureChannel::Red => 0,
+                TextureChannel::Green => 1,
+                TextureChannel::Blue => 2,
+                TextureChannel::Alpha => 3,
+            }),
+            scale: t.scale.map(|v| v as f32),
+            bias: t.bias.map(|v| v as f32),
+            uv: t.uv.rows().map(|row| row.map(|v| v as f32)),
+        }
+    }
+
+    /// Red, green, blue and alpha at the surface's texture coordinates.
+    #[inline]
+    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
+        let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+        // The image's rows go down, its coordinates up.
+        let (x, y) = (self.along(0, x), self.along(1, 1.0 - y));
+        let mut v = if self.nearest {
+            self.texel(x.nearest(), y.nearest())
+        } else {
+            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
+            let (a, b) = (self.texel(x0, y0), self.texel(x1, y0));
+            let (c, d) = (self.texel(x0, y1), self.texel(x1, y1));
+            // Equal texels give exactly their value.
+            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
+            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
+        };
+        if let Some(c) = self.channel {
+            v = [v[c], v[c], v[c], v[3]];
+        }
+        let [r, g, b] = [0, 1, 2].map(|i| v[i] * self.scale[i] + self.bias[i]);
+        [r, g, b, v[3]]
+    }
+
+    /// Mean of red, green and blue over the texels and the mean of alpha: what bilinear interpolation of the repeated image
+    /// has as its mean over the unit square.
+    pub fn mean(&self) -> [f32; 4] {
+        let mut sum = [0f64; 4];
+        for y in 0..self.texels.height {
+            for x in 0..self.texels.width {
+                let t = self.texel(x, y);
+                let t = self.channel.map_or(t, |c| [t[c], t[c], t[c], t[3]]);
+                (0..4).for_each(|i| sum[i] += f64::from(t[i]));
+            }
+        }
+        let n = (self.texels.width * self.texels.height) as f64;
+        let mean = sum.map(|s| (s / n) as f32);
+        let [r, g, b] = [0, 1, 2].map(|i| mean[i] * self.scale[i] + self.bias[i]);
+        [r, g, b, mean[3]]
+    }
+
+    #[inline(always)]
+    fn along(&self, axis: usize, coordinate: f32) -> Along {
+        let size = if axis == 0 {
+            self.texels.width
+        } else {
+            self.texels.height
+        };
+        Along::new(coordinate, size, self.wrap[axis])
+    }
+
+    /// The texel in column `x` of row `y`, decoded.
+    #[inline(always)]
+    fn texel(&self, x: usize, y: usize) -> [f32; 4] {
+        let t = &*self.texels;
+        let first = (y * t.width + x) * t.channels;
+        let range = first..first + t.channels;
+        match &t.data {
+            TexelData::U8(v) => self.decode(&v[range], |c| usize::from(*c), 1.0 / 255.0),
+            TexelData::U16(v) => self.decode(&v[range], |c| usize::from(*c), 1.0 / 65535.0),
+            TexelData::F16(v) => self.expand(&v[range], |c| c.to_f32()),
+            TexelData::F32(v) => self.expand(&v[range], |c| *c),
+        }
+    }
+
+    /// From codes; the last of an even number of channels is alpha.
+    #[inline(always)]
+    fn decode<C>(&self, codes: &[C], index: impl Fn(&C) -> usize, unit: f32) -> [f32; 4] {
+        let color = |c: &C| match self.curve {
+            Curve::Table(table) => table[index(c)],
+            _ => index(c) as f32 * unit,
+        };
+        let alpha = |c: &C| index(c) as f32 * unit;
+        spread(codes, color, alpha)
+    }
+
+    /// From floating-point values.
+    #[inline(always)]
+    fn expand<C>(&self, values: &[C], value: impl Fn(&C) -> f32) -> [f32; 4] {
+        let color = |c: &C| match self.curve {
+            Curve::Formula => srgb::linear(f64::from(value(c))) as f32,
+            _ => value(c),
+        };
+        spread(values, color, &value)
+    }
+}
+
+/// One to four channels as four.
+#[inline(always)]
+fn spread<C>(channels: &[C], color: impl Fn(&C) -> f32, alpha: impl Fn(&C) -> f32) -> [f32; 4] {
+    match channels {
+        [y] => {
+            let y = color(y);
+            [y, y, y, 1.0]
+        }
+        [y, a] => {
+            let y = color(y);
+            [y, y, y, alpha(a)]
+        }
+        [r, g, b] => [color(r), color(g), color(b), 1.0],
+        [r, g, b, a, ..] => [color(r), color(g), color(b), alpha(a)],
+        [] => [0.0; 4],
+    }
+}
+
+/// A position along one axis of an image, wrapped: in texels from the first one's outer edge.
+#[derive(Clone, Copy)]
+struct Along {
+    position: f32,
+    size: usize,
+    wrap: Wrap,
+}
+
+impl Along {
+    #[inline(always)]
+    fn new(coordinate: f32, size: usize, wrap: Wrap) -> Self {
+        // A coordinate that is no number has to be somewhere.
+        let c = if coordinate.is_finite() {
+            coordinate
+        } else {
+            0.0
+        };
+        let unit = match wrap {
+            Wrap::Repeat => c - c.floor(),
+            Wrap::Clamp => c.clamp(0.0, 1.0),
+            Wrap::Mirror => {
+                let period = c - 2.0 * (0.5 * c).floor();
+                if period > 1.0 { 2.0 - period } else { period }
+            }
+        };
+        Self {
+            position: unit * size as f32,
+            size,
+            wrap,
+        }
+    }
+
+    /// The texel whose square it lies in.
+    #[inline(always)]
+    fn nearest(&self) -> usize {
+        // c − ⌊c⌋ rounds to 1 just below an integer: that is the last texel.
+        (self.position as usize).min(self.size - 1)
+    }
+
+    /// The two texels whose middles it lies between, and the weight of the second.
+    #[inline(always)]
+    fn pair(&self) -> (usize, usize, f32) {
+        let from_middle = self.position - 0.5;
+        let low = from_middle.floor();
+        let weight = from_middle - low;
+        // At most half a texel beyond either edge.
+        let last = self.size - 1;
+        let beyond = match self.wrap {
+            Wrap::Repeat => (last, 0),
+            Wrap::Clamp | Wrap::Mirror => (0, last),
+        };
+        let first = if low < 0.0 {
+            beyond.0
+        } else {
+            (low as usize).min(last)
+        };
+        let second = if low < 0.0 { 0 } else { low as usize + 1 };
+        let second = if second > last { beyond.1 } else { second };
+        (first, second, weight)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use describe::{ImageSource, UvTransform};
+
+    fn described() -> describe::Texture {
+        describe::Texture {
+            color_space: ColorSpace::Linear,
+            ..describe::Texture::new(ImageSource::File("x.png".into()))
+        }
+    }
+
+    /// A grey image of `width` columns; the first row is the top one.
+    fn grey(width: usize, values: &[f32], edit: impl FnOnce(&mut describe::Texture)) -> Texture {
+        let texels = Texels {
+            width,
+            height: values.len() / width,
+            channels: 1,
+            data: TexelData::F32(values.to_vec()),
+        };
+        let mut t = described();
+        edit(&mut t);
+        Texture::new(Arc::new(texels), &t)
+    }
+
+    fn red(t: &Texture, u: f32, v: f32) -> f32 {
+        t.at([u, v])[0]
+    }
+
+    #[test]
+    fn texels_are_met_in_their_middles_from_the_lower_left() {
+        // 4 × 2: the upper row is 0 1 2 3, the lower 4 5 6 7.
+        let values: Vec<f32> = (0..8u8).map(f32::from).collect();
+        for filter in [TextureFilter::Bilinear, TextureFilter::Nearest] {
+            let t = grey(4, &values, |t| t.filter = filter);
+            for x in 0..4 {
+                let u = (x as f32 + 0.5) / 4.0;
+                assert_eq!(red(&t, u, 0.75), values[x]);
+                assert_eq!(red(&t, u, 0.25), values[4 + x]);
+            }
+        }
+    }
+
+    #[test]
+    fn between_middles_values_are_bilinear() {
+        let t = grey(2, &[0.0, 8.0, 16.0, 64.0], |t| t.wrap = [Wrap::Clamp; 2]);
+        // Middles are at 0.25 and 0.75; the upper row (v = 0.75) is 0 8, the lower 16 64.
+        for (u, v, expected) in [
+            (0.5, 0.75, 4.0),
+            (0.5, 0.25, 40.0),
+            (0.25, 0.5, 8.0),
+            (0.375, 0.75, 2.0),
+            // a quarter of the way right, three quarters of the way up: ¼·(16 + 12) + ¾·(0 + 2)
+            (0.375, 0.625, 8.5),
+            (0.0, 1.0, 0.0),
+            (1.0, 0.0, 64.0),
+        ] {
+            assert_eq!(red(&t, u, v), expected, "({u}, {v})");
+        }
+    }
+
+    #[test]
+    fn beyond_the_edges() {
+        let row = [1.0, 2.0, 4.0, 8.0];
+        let at = |wrap: Wrap, u: f32| red(&grey(4, &row, |t| t.wrap[0] = wrap), u, 0.5);
+        // Across the edge, halfway between the last middle and the next.
+        assert_eq!(at(Wrap::Repeat, 0.0), 4.5);
+        assert_eq!(at(Wrap::Repeat, 1.0), 4.5);
+        assert_eq!(at(Wrap::Clamp, 0.0), 1.0);
+        assert_eq!(at(Wrap::Clamp, 1.0), 8.0);
+        assert_eq!(at(Wrap::Mirror, 0.0), 1.0);
+        assert_eq!(at(Wrap::Mirror, 1.0), 8.0);
+        for i in -3i16..=3 {
+            for (x, value) in row.iter().enumerate() {
+                let u = f32::from(i) + (x as f32 + 0.5) / 4.0;
+                assert_eq!(at(Wrap::Repeat, u), *value, "{u}");
+                let mirrored = if i % 2 == 0 { *value } else { row[3 - x] };
+                assert_eq!(at(Wrap::Mirror, u), mirrored, "{u}");
+                let clamped = match i {
+                    0 => *value,
+                    i if i < 0 => 1.0,
+                    _ => 8.0,
+                };
+                assert_eq!(at(Wrap::Clamp, u), clamped, "{u}");
+            }
+        }
+        // Just below an integer, where u − ⌊u⌋ rounds to 1, and numbers that are none.
+        let below = grey(4, &row, |t| t.filter = TextureFilter::Nearest);
+        assert_eq!(red(&below, -1e-12, 0.5), 8.0);
+        for odd in [f32::NAN, f32::INFINITY, f32::MIN, 1e30] {
+            assert!(red(&below, odd, odd) >= 1.0);
+        }
+    }
+
+    #[test]
+    fn axes_wrap_on_their_own() {
+        let t = grey(2, &[0.0, 1.0, 2.0, 3.0], |t| {
+            t.wrap = [Wrap::Repeat, Wrap::Clamp];
+            t.filter = TextureFilter::Nearest;
+        });
+        assert_eq!(red(&t, 1.25, 9.0), 0.0);
+        assert_eq!(red(&t, -0.25, -9.0), 3.0);
+    }
+
+    /// 8 and 16 bits: exact ends, the standard's curve, interpolation after decoding, alpha linear.
+    #[test]
+    fn codes_are_decoded_before_they_are_interpolated() {
+        let rgba = Texels {
+            width: 2,
+            height: 1,
+            channels: 4,
+            data: TexelData::U8(vec![0, 128, 255, 128, 255, 128, 0, 0]),
+        };
+        let srgb = describe::Texture::new(ImageSource::File("x.png".into()));
+        let t = Texture::new(Arc::new(rgba.clone()), &srgb);
+        let half = srgb::linear(128.0 / 255.0) as f32;
+        assert_eq!(t.at([0.25, 0.5]), [0.0, half, 1.0, 128.0 / 255.0]);
+        let middle = t.at([0.5, 0.5]);
+        assert_eq!(middle[0], 0.5);
+        assert!((middle[3] - 64.0 / 255.0).abs() < 1e-7);
+        let t = Texture::new(Arc::new(rgba), &described());
+        assert_eq!(t.at([0.25, 0.5])[1], 128.0 / 255.0);
+        let wide = Texels {
+            width: 1,
+            height: 1,
+            channels: 3,
+            data: TexelData::U16(vec![0, 32_896, 65_535]),
+        };
+        let t = Texture::new(Arc::new(wide), &srgb);
+        assert_eq!(t.at([0.3, 0.3]), [0.0, half, 1.0, 1.0]);
+    }
+
+    #[test]
+    fn floats_are_linear_unless_said_otherwise() {
+        let texels = Arc::new(Texels {
+            width: 1,
+            height: 1,
+            channels: 3,
+            data: TexelData::F16([0.5, -0.5, 4.0].map(half::f16::from_f32).to_vec()),
+        });
+        let auto = describe::Texture::new(ImageSource::File("x.exr".into()));
+        assert_eq!(
+            Texture::new(texels.clone(), &auto).at([0.0, 0.0]),
+            [0.5, -0.5, 4.0, 1.0]
+        );
+        let srgb = describe::Texture {
+            color_space: ColorSpace::Srgb,
+            ..auto
+        };
+        let v = Texture::new(texels, &srgb).at([0.0, 0.0]);
+        assert_eq!([v[0], v[1]], [0.5, -0.5].map(|x| srgb::linear(x) as f32));
+    }
+
+    #[test]
+    fn channels_factors_and_the_mean() {
+        let texels = Arc::new(Texels {
+            width: 2,
+            height: 1,
+            channels: 2,
+            data: TexelData::F32(vec![0.25, 0.5, 0.75, 1.0]),
+        });
+        let mut t = described();
+        t.scale = [2.0, -1.0, 0.0];
+        t.bias = [0.0, 1.0, 0.125];
+        let grey = Texture::new(texels.clone(), &t);
+        assert_eq!(grey.at([0.25, 0.0]), [0.5, 0.75, 0.125, 0.5]);
+        assert_eq!(grey.mean(), [1.0, 0.5, 0.125, 0.75]);
+        t.channel = Some(TextureChannel::Alpha);
+        let alpha = Texture::new(texels, &t);
+        assert_eq!(alpha.at([0.25, 0.0]), [1.0, 0.5, 0.125, 0.5]);
+    }
+
+    /// The transform scales, rotates counter-clockwise and moves, in this order.
+    #[test]
+    fn coordinates_are_transformed() {
+        let values: Vec<f32> = (0..64u8).map(f32::from).collect();
+        let plain = grey(8, &values, |_| {});
+        let uv = UvTransform {
+            scale: [2.0, 0.5],
+            rotation_deg: 90.0,
+            offset: [0.125, 0.25],
+        };
+        let turned = grey(8, &values, |t| t.uv = uv);
+        for (u, v) in [(0.1, 0.7), (0.0, 0.0), (0.33, 0.9), (-0.4, 1.6)] {
+            // (u, v) → (2u, v/2) → (−v/2, 2u) → + offset
+            let expected = red(&plain, 0.125 - 0.5 * v, 0.25 + 2.0 * u);
+            let found = red(&turned, u, v);
+            assert!((found - expected).abs() < 1e-3, "{found} {expected}");
+        }
+    }
+}
