@@ -3,7 +3,7 @@
 //! | name | type | unit | default | range | meaning |
 //! |---|---|---|---|---|---|
 //! | `bsdf` | plugin (bsdf) | | required | | what is there |
-//! | `opacity` | float | | 1 | [0, 1] | how much of it is there |
+//! | `opacity` | float or texture | | 1 | [0, 1] | how much of it is there |
 //! | `cutoff` | float | | | [0, 1] | if given: an opacity below it counts as 0, any other as 1 |
 //!
 //! A share `opacity` of the light meets the nested BSDF, the rest passes unchanged, as through holes too small to be seen. It is
@@ -23,7 +23,7 @@ use resolvent_api::operator::{Measure, lobes};
 use resolvent_api::surface::bsdf_traits;
 use resolvent_api::{
     Bsdf, Decl, Error, Mode, NestedBsdf, NestedClosures, ParamDecl, Params, Plugin, Scatter,
-    ScatterDraws, ScatterEval, ScatterSample, Spectrum, SurfacePoint, Vec3,
+    ScatterDraws, ScatterEval, ScatterSample, Spectrum, SurfacePoint, TexturedFloat, Vec3,
 };
 
 /// Words for the nested closure: what is left of a closure.
@@ -36,7 +36,7 @@ const PASSED: u32 = u32::MAX;
 #[derive(Clone, Copy)]
 pub struct Mask {
     bsdf: NestedBsdf,
-    opacity: f32,
+    opacity: TexturedFloat,
     cutoff: Option<f32>,
 }
 
@@ -45,6 +45,8 @@ pub struct Mask {
 pub struct Masked {
     closure: NestedClosures<1, WORDS>,
     opacity: f32,
+    /// The opacity is textured: the surface is a vertex also where it lets everything pass.
+    varies: bool,
 }
 
 impl Plugin for Mask {
@@ -58,6 +60,7 @@ impl Plugin for Mask {
             .default("1")
             .at_least(0.0)
             .at_most(1.0)
+            .texturable()
             .build(),
         Decl::float("cutoff", "an opacity below it counts as 0, any other as 1")
             .at_least(0.0)
@@ -70,18 +73,18 @@ impl Plugin for Mask {
             bsdf: params
                 .bsdf("bsdf")?
                 .ok_or_else(|| Error::new("the parameter 'bsdf' has no value"))?,
-            opacity: params.float("opacity")? as f32,
+            opacity: params.textured_float("opacity")?,
             cutoff: params.float("cutoff").ok().map(|c| c as f32),
         })
     }
 }
 
 impl Mask {
-    /// The opacity after the cutoff.
-    fn resolved(&self) -> f32 {
+    /// An opacity after the cutoff.
+    fn resolved(&self, opacity: f32) -> f32 {
         match self.cutoff {
-            Some(cutoff) => f32::from(u8::from(self.opacity >= cutoff)),
-            None => self.opacity,
+            Some(cutoff) => f32::from(u8::from(opacity >= cutoff)),
+            None => opacity,
         }
     }
 }
@@ -90,10 +93,13 @@ impl Bsdf for Mask {
     type Closure = Masked;
 
     fn traits(&self) -> u32 {
-        if self.resolved() == 0.0 {
-            return bsdf_traits::NULL | bsdf_traits::UNIFORM;
+        match self.opacity.constant() {
+            Some(opacity) if self.resolved(opacity) == 0.0 => {
+                bsdf_traits::NULL | bsdf_traits::UNIFORM
+            }
+            Some(_) => self.bsdf.traits() & (bsdf_traits::NULL | bsdf_traits::UNIFORM),
+            None => self.bsdf.traits() & bsdf_traits::NULL,
         }
-        self.bsdf.traits() & (bsdf_traits::NULL | bsdf_traits::UNIFORM)
     }
 
     fn ior(&self) -> f32 {
@@ -103,7 +109,8 @@ impl Bsdf for Mask {
     fn closure(&self, at: &SurfacePoint) -> Masked {
         Masked {
             closure: NestedClosures::resolve([self.bsdf], at),
-            opacity: self.resolved(),
+            opacity: self.resolved(self.opacity.at(at)),
+            varies: !self.opacity.is_constant(),
         }
     }
 }
@@ -144,7 +151,11 @@ impl Scatter for Masked {
 
     fn lobes(&self) -> u32 {
         if self.opacity == 0.0 {
-            return lobes::PASSES;
+            return if self.varies {
+                lobes::DELTA
+            } else {
+                lobes::PASSES
+            };
         }
         let inner = self.closure.lobes(0);
         if self.opacity == 1.0 || inner == lobes::PASSES {

@@ -150,3 +150,25 @@ fn the_ends_and_the_cutoff() {
     }
     assert!(create_with::<Mask>("{}", &[]).is_err());
 }
+
+/// A textured opacity is that of the point, after the cutoff; holes are vertices that pass everything.
+#[test]
+fn opacity_follows_a_texture() {
+    let plain = mask(r#"{ "opacity": { "texture": "uv" } }"#);
+    let cut = mask(r#"{ "opacity": { "texture": "uv" }, "cutoff": 0.5 }"#);
+    assert_eq!((plain.traits(), cut.traits()), (0, 0));
+    for (u, after) in [(0.0, 0.0), (0.25, 0.0), (0.5, 1.0), (1.0, 1.0)] {
+        let at = SurfacePoint {
+            uv: [u, 0.9],
+            ..SurfacePoint::default()
+        };
+        assert_eq!(plain.closure(&at).opacity, u);
+        assert_eq!(cut.closure(&at).opacity, after);
+    }
+    let hole = plain.closure(&SurfacePoint::default());
+    assert_eq!(hole.lobes(), lobes::DELTA);
+    let s = hole
+        .sample(Vec3::Z, ScatterDraws::default(), Mode::Radiance)
+        .unwrap();
+    assert_eq!((s.wi, s.forward), ([0.0, 0.0, -1.0], 1.0));
+}

@@ -4,7 +4,7 @@
 //! |---|---|---|---|---|---|
 //! | `a` | plugin (bsdf) | | required | | the first |
 //! | `b` | plugin (bsdf) | | required | | the second |
-//! | `weight` | float | | 0.5 | [0, 1] | share of the second |
+//! | `weight` | float or texture | | 0.5 | [0, 1] | share of the second |
 //!
 //! f = (1 − w) f_a + w f_b, with the densities mixed likewise. Mixtures may nest; the two closures are held inline as far as 432
 //! bytes go, and one that is larger is resolved anew whenever it is evaluated. A body has one index of refraction, so two BSDFs
@@ -24,7 +24,7 @@ use resolvent_api::operator::{Measure, lobes};
 use resolvent_api::surface::bsdf_traits;
 use resolvent_api::{
     Bsdf, Decl, Error, Mode, NestedBsdf, NestedClosures, ParamDecl, Params, Plugin, Scatter,
-    ScatterDraws, ScatterEval, ScatterSample, SurfacePoint, Vec3,
+    ScatterDraws, ScatterEval, ScatterSample, SurfacePoint, TexturedFloat, Vec3,
 };
 
 /// Words for the nested closures: what is left of a closure.
@@ -34,7 +34,7 @@ const WORDS: usize = 54;
 #[derive(Clone, Copy)]
 pub struct Mix {
     bsdfs: [NestedBsdf; 2],
-    weight: f32,
+    weight: TexturedFloat,
     ior: f32,
 }
 
@@ -58,6 +58,7 @@ impl Plugin for Mix {
             .default("0.5")
             .at_least(0.0)
             .at_most(1.0)
+            .texturable()
             .build(),
     ];
 
@@ -76,7 +77,7 @@ impl Plugin for Mix {
         }
         Ok(Self {
             bsdfs,
-            weight: params.float("weight")? as f32,
+            weight: params.textured_float("weight")?,
             ior: if a != 1.0 { a } else { b },
         })
     }
@@ -87,7 +88,12 @@ impl Bsdf for Mix {
 
     fn traits(&self) -> u32 {
         // Both pass light unchanged, or are the same everywhere: then so is the mixture.
-        self.bsdfs[0].traits() & self.bsdfs[1].traits() & (bsdf_traits::NULL | bsdf_traits::UNIFORM)
+        let uniform = if self.weight.is_constant() {
+            bsdf_traits::UNIFORM
+        } else {
+            0
+        };
+        self.bsdfs[0].traits() & self.bsdfs[1].traits() & (bsdf_traits::NULL | uniform)
     }
 
     fn ior(&self) -> f32 {
@@ -96,15 +102,16 @@ impl Bsdf for Mix {
 
     fn closure(&self, at: &SurfacePoint) -> Mixture {
         let closures = NestedClosures::resolve(self.bsdfs, at);
+        let weight = self.weight.at(at);
         // What scatters nothing is not worth choosing.
         let choice = match [0, 1].map(|i| closures.lobes(i) != 0) {
             [true, false] => 0.0,
             [false, true] => 1.0,
-            _ => self.weight,
+            _ => weight,
         };
         Mixture {
             closures,
-            weight: self.weight,
+            weight,
             choice,
         }
     }

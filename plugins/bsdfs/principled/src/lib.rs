@@ -21,6 +21,8 @@
 //! | `sheen_color` | spectrum | | 1 | [0, 1] | its colour |
 //! | `sheen_roughness` | float | | 0.3 | [0, 1] | spread of its fibres |
 //!
+//! Every number and spectrum but the indices may be a texture; its values are clamped to the range.
+//!
 //! **Layers**, from below. A base that mixes, by `metallic`, a metal with a dielectric, which mixes, by `transmission`, a
 //! transparent body with a diffuse one under a reflecting boundary; all with facets of one GGX distribution. A coat, which reflects as its
 //! index says. Fuzz, after Estevez & Kulla 2017. The dielectric's reflectance follows Fresnel's curve between its colour at normal
@@ -51,12 +53,15 @@ mod surface;
 mod tests;
 
 use resolvent_api::surface::bsdf_traits;
-use resolvent_api::{Bsdf, Decl, Error, ParamDecl, Params, Plugin, Spectrum, SurfacePoint};
+use resolvent_api::{
+    Bsdf, Decl, Error, ParamDecl, Params, Plugin, Spectrum, SurfacePoint, Textured, TexturedFloat,
+    TexturedSpectrum,
+};
 use surface::Surface;
 
 /// The parameters at a point.
 #[derive(Clone, Copy, Debug)]
-pub struct Principled {
+pub struct Parameters {
     base_color: Spectrum,
     metallic: f32,
     roughness: f32,
@@ -77,11 +82,37 @@ pub struct Principled {
     sheen_roughness: f32,
 }
 
+/// The plugin.
+#[derive(Debug)]
+pub struct Principled {
+    base_color: TexturedSpectrum,
+    metallic: TexturedFloat,
+    roughness: TexturedFloat,
+    anisotropy: TexturedFloat,
+    specular: TexturedFloat,
+    specular_color: TexturedSpectrum,
+    f0: Option<TexturedSpectrum>,
+    edge_color: TexturedSpectrum,
+    ior: f32,
+    transmission: TexturedFloat,
+    transmission_color: Option<TexturedSpectrum>,
+    thin: bool,
+    clearcoat: TexturedFloat,
+    clearcoat_roughness: TexturedFloat,
+    clearcoat_ior: f32,
+    sheen: TexturedFloat,
+    sheen_color: TexturedSpectrum,
+    sheen_roughness: TexturedFloat,
+    /// The parameters, if they are the same everywhere.
+    constant: Option<Parameters>,
+}
+
 const fn share(name: &'static str, default: &'static str, help: &'static str) -> ParamDecl {
     Decl::float(name, help)
         .default(default)
         .at_least(0.0)
         .at_most(1.0)
+        .texturable()
         .build()
 }
 
@@ -90,6 +121,7 @@ const fn colour(name: &'static str, default: &'static str, help: &'static str) -
         .default(default)
         .at_least(0.0)
         .at_most(1.0)
+        .texturable()
         .build()
 }
 
@@ -117,6 +149,7 @@ impl Plugin for Principled {
         )
         .default("1")
         .at_least(0.0)
+        .texturable()
         .build(),
         Decl::spectrum(
             "f0",
@@ -124,6 +157,7 @@ impl Plugin for Principled {
         )
         .at_least(0.0)
         .at_most(1.0)
+        .texturable()
         .build(),
         colour(
             "edge_color",
@@ -142,6 +176,7 @@ impl Plugin for Principled {
         )
         .at_least(0.0)
         .at_most(1.0)
+        .texturable()
         .build(),
         Decl::bool("thin", "a thin sheet, through which light passes unbent")
             .default("false")
@@ -159,32 +194,87 @@ impl Plugin for Principled {
     ];
 
     fn create(params: &Params<'_>) -> Result<Self, Error> {
-        let number = |name: &str| params.float(name).map(|v| v as f32);
+        let number = |name: &str| params.textured_float(name);
         let colour = |name: &str| {
             params
-                .spectrum(name)
+                .textured_spectrum(name)?
                 .ok_or_else(|| Error::new(format!("the parameter '{name}' has no value")))
         };
-        Ok(Self {
+        let mut all = Self {
             base_color: colour("base_color")?,
             metallic: number("metallic")?,
             roughness: number("roughness")?,
             anisotropy: number("anisotropy")?,
             specular: number("specular")?,
             specular_color: colour("specular_color")?,
-            f0: params.spectrum("f0"),
+            f0: params.textured_spectrum("f0")?,
             edge_color: colour("edge_color")?,
-            ior: number("ior")?,
+            ior: params.float("ior")? as f32,
             transmission: number("transmission")?,
-            transmission_color: params.spectrum("transmission_color"),
+            transmission_color: params.textured_spectrum("transmission_color")?,
             thin: params.bool("thin")?,
             clearcoat: number("clearcoat")?,
             clearcoat_roughness: number("clearcoat_roughness")?,
-            clearcoat_ior: number("clearcoat_ior")?,
+            clearcoat_ior: params.float("clearcoat_ior")? as f32,
             sheen: number("sheen")?,
             sheen_color: colour("sheen_color")?,
             sheen_roughness: number("sheen_roughness")?,
-        })
+            constant: None,
+        };
+        if all.is_constant() {
+            all.constant = Some(all.resolve(&SurfacePoint::default()));
+        }
+        Ok(all)
+    }
+}
+
+impl Principled {
+    fn is_constant(&self) -> bool {
+        let numbers = [
+            self.metallic,
+            self.roughness,
+            self.anisotropy,
+            self.specular,
+            self.transmission,
+            self.clearcoat,
+            self.clearcoat_roughness,
+            self.sheen,
+            self.sheen_roughness,
+        ];
+        let colours = [
+            Some(self.base_color),
+            Some(self.specular_color),
+            self.f0,
+            Some(self.edge_color),
+            self.transmission_color,
+            Some(self.sheen_color),
+        ];
+        numbers.iter().all(Textured::is_constant)
+            && colours.iter().flatten().all(Textured::is_constant)
+    }
+
+    /// The parameters at a point.
+    fn resolve(&self, at: &SurfacePoint) -> Parameters {
+        Parameters {
+            base_color: self.base_color.at(at),
+            metallic: self.metallic.at(at),
+            roughness: self.roughness.at(at),
+            anisotropy: self.anisotropy.at(at),
+            specular: self.specular.at(at),
+            specular_color: self.specular_color.at(at),
+            f0: self.f0.map(|c| c.at(at)),
+            edge_color: self.edge_color.at(at),
+            ior: self.ior,
+            transmission: self.transmission.at(at),
+            transmission_color: self.transmission_color.map(|c| c.at(at)),
+            thin: self.thin,
+            clearcoat: self.clearcoat.at(at),
+            clearcoat_roughness: self.clearcoat_roughness.at(at),
+            clearcoat_ior: self.clearcoat_ior,
+            sheen: self.sheen.at(at),
+            sheen_color: self.sheen_color.at(at),
+            sheen_roughness: self.sheen_roughness.at(at),
+        }
     }
 }
 
@@ -192,16 +282,25 @@ impl Bsdf for Principled {
     type Closure = Surface;
 
     fn traits(&self) -> u32 {
-        bsdf_traits::UNIFORM
+        if self.constant.is_some() {
+            bsdf_traits::UNIFORM
+        } else {
+            0
+        }
     }
 
     fn ior(&self) -> f32 {
-        let enters = self.transmission > 0.0 && self.metallic < 1.0 && !self.thin;
+        // A textured share may be anything somewhere.
+        let passes = self.transmission.constant() != Some(0.0);
+        let enters = passes && self.metallic.constant() != Some(1.0) && !self.thin;
         if enters { self.ior } else { 1.0 }
     }
 
     fn closure(&self, at: &SurfacePoint) -> Surface {
-        Surface::new(self, at.outside_ior, at.lanes)
+        match &self.constant {
+            Some(parameters) => Surface::new(parameters, at.outside_ior, at.lanes),
+            None => Surface::new(&self.resolve(at), at.outside_ior, at.lanes),
+        }
     }
 }
 

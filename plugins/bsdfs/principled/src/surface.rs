@@ -1,6 +1,6 @@
 //! The layers at a point, and how they scatter together.
 
-use crate::{Principled, sheen};
+use crate::{Parameters, sheen};
 use core::f32::consts::{FRAC_1_PI, FRAC_1_SQRT_2};
 use resolvent_api::math::warp;
 use resolvent_api::microfacet::fresnel::{self, Tinted};
@@ -96,7 +96,7 @@ struct Passage {
 
 impl Surface {
     /// The layers that the parameters describe, in surroundings of index `outside`.
-    pub fn new(p: &Principled, outside: f32, lanes: u32) -> Self {
+    pub fn new(p: &Parameters, outside: f32, lanes: u32) -> Self {
         let eta = p.ior / outside;
         let bent = eta.max(1.0 / eta);
         let eta_curve = if p.f0.is_some() { CURVE_IOR } else { bent };

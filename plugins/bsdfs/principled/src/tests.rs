@@ -25,6 +25,36 @@ fn draw(lobe: f32) -> ScatterDraws {
     }
 }
 
+/// Parameters follow their textures, and a point has the closure of its values.
+#[test]
+fn textures_are_resolved_at_every_point() {
+    let plugin: Principled = create(
+        r#"{ "base_color": { "texture": "uv" }, "roughness": { "texture": "uv" }, "metallic": 0.5 }"#,
+    )
+    .unwrap();
+    assert_eq!(plugin.traits(), 0);
+    for uv in [[0.25f32, 0.75], [0.9, 0.1]] {
+        let k = plugin.closure(&SurfacePoint {
+            uv,
+            ..SurfacePoint::default()
+        });
+        let same = surface(&format!(
+            r#"{{ "base_color": [{0}, {1}, 0], "roughness": {0}, "metallic": 0.5 }}"#,
+            uv[0], uv[1]
+        ));
+        let (wo, wi) = (at(0.6, 0.3), at(0.7, 2.0));
+        let (a, b) = (
+            k.eval(wo, wi, Mode::Radiance),
+            same.eval(wo, wi, Mode::Radiance),
+        );
+        assert_eq!(a, b);
+    }
+    // What is transparent somewhere has an inside.
+    let plugin: Principled = create(r#"{ "transmission": { "texture": "uv" } }"#).unwrap();
+    assert_eq!(plugin.ior(), 1.5);
+    assert!(create::<Principled>(r#"{ "ior": { "texture": "uv" } }"#).is_err());
+}
+
 /// χ², weights, densities both ways, reciprocity and modes over the layers.
 #[test]
 fn samples_follow_their_density() {
