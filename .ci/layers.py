@@ -23,13 +23,15 @@ def layer(name):
 ALLOWED = {
     "core/api": set(),
     "core/pathspace": {"core/api"},
-    "core/engine": {"core/api", "core/pathspace", "formats/scene", "formats/image", "formats/ply"},
-    "cli": {"core/api", "core/engine", "formats/scene", "formats/image", "formats/vdb"},
+    "core/engine": {"core/api", "core/pathspace", "formats/scene", "formats/image", "formats/ply", "formats/gltf"},
+    "cli": {"core/api", "core/engine", "formats/scene", "formats/image", "formats/vdb", "formats/gltf"},
     "plugins/media": {"core/api", "formats/vdb"},
     "plugins/phases": {"core/api"},
     "plugins/bsdfs": {"core/api"},
     "plugins/integrators": {"core/api", "core/pathspace"},
     "formats/vdb": set(), "formats/scene": set(), "formats/image": set(), "formats/ply": set(),
+    # Models become parts of scenes.
+    "formats/gltf": {"formats/scene"},
     "tests": {"core/api", "core/pathspace", "core/engine", "formats/scene", "formats/image", "formats/vdb"},
 }
 faults = []

@@ -125,6 +125,7 @@ fn geometry(g: &Geometry) -> &'static str {
         Geometry::Cylinder { .. } => "cylinder",
         Geometry::Mesh(_) => "mesh",
         Geometry::Ply { .. } => "ply",
+        Geometry::Gltf { .. } => "gltf",
     }
 }
 
@@ -194,7 +195,7 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
         }
     }
     for s in scene.all_shapes() {
-        if let Geometry::Ply { file, .. } = &s.geometry {
+        if let Geometry::Ply { file, .. } | Geometry::Gltf { file, .. } = &s.geometry {
             add(file);
         }
     }

@@ -395,6 +395,8 @@ pub struct Shape {
     pub material: Option<String>,
     /// Radiance emitted from the outer side, W·sr⁻¹·m⁻², ≥ 0.
     pub emission: Option<Vec3>,
+    /// Name in [`Scene::textures`] of what the emission is multiplied with over the surface; for rectangles and meshes.
+    pub emission_texture: Option<String>,
     /// Emits from both sides; of no meaning without emission.
     pub two_sided: bool,
     /// Name in [`Scene::media`] of what fills it; for closed shapes only.
@@ -455,6 +457,14 @@ pub enum Geometry {
     },
     /// Triangles in the scene file, counter-clockwise seen from outside.
     Mesh(Mesh),
+    /// The meshes of a glTF 2.0 model with their own materials, emission and interiors; a material or interior of the shape
+    /// replaces those of the model. The model's cameras and punctual lights are left out.
+    Gltf {
+        /// The file, as the scene names it; see [`Scene::resolve`].
+        file: String,
+        /// The model's space to world.
+        transform: Transform,
+    },
     /// Triangles in a PLY file, counter-clockwise seen from outside.
     Ply {
         /// The file, as the scene names it; see [`Scene::resolve`].

@@ -264,7 +264,7 @@ pub(crate) static SCENE: Object = Object {
 };
 
 const SHAPES: Kind = Kind::List(&Kind::Variants(&[
-    &SPHERE, &RECTANGLE, &DISK, &CYLINDER, &MESH, &PLY,
+    &SPHERE, &RECTANGLE, &DISK, &CYLINDER, &MESH, &PLY, &GLTF,
 ]));
 
 static INSTANCE: Object = Object {
@@ -694,6 +694,11 @@ const EMISSION: Field = may(
     Kind::Spectrum,
     "Radiance emitted from the outer side: one number or RGB",
 );
+const EMISSION_TEXTURE: Field = may(
+    "emission_texture",
+    Kind::Name,
+    "Name of a texture that the emission is multiplied with",
+);
 const TWO_SIDED: Field = may("two_sided", Kind::Bool, "Emits from both sides (false)");
 const INTERIOR: Field = may(
     "interior",
@@ -742,11 +747,13 @@ static RECTANGLE: Object = Object {
         ),
         MATERIAL_NAME,
         EMISSION,
+        EMISSION_TEXTURE,
         TWO_SIDED,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission"]),
+        Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
     ],
 };
@@ -808,14 +815,37 @@ static MESH: Object = Object {
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,
+        EMISSION_TEXTURE,
         TWO_SIDED,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
     ],
+};
+
+static GLTF: Object = Object {
+    name: "gltf",
+    help: "The meshes and materials of a glTF 2.0 model (.gltf, .glb)",
+    fields: &[
+        need("file", Kind::Name, "The model, relative to the scene file"),
+        TO_WORLD,
+        may(
+            "material",
+            Kind::Name,
+            "Name of a material in place of the model's",
+        ),
+        may(
+            "interior",
+            Kind::Name,
+            "Name of a medium in place of the model's",
+        ),
+        PRIORITY,
+    ],
+    rules: &[],
 };
 
 static PLY: Object = Object {
@@ -830,12 +860,14 @@ static PLY: Object = Object {
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,
+        EMISSION_TEXTURE,
         TWO_SIDED,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
+        Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
     ],
 };

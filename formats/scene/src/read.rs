@@ -146,6 +146,13 @@ impl Reader<'_> {
             let (material, interior) = (shape.material.as_deref(), shape.interior.as_deref());
             self.known(node.get("material"), material, "material", &scene.materials);
             self.known(node.get("interior"), interior, "medium", &scene.media);
+            let texture = shape.emission_texture.as_deref();
+            self.known(
+                node.get("emission_texture"),
+                texture,
+                "texture",
+                &scene.textures,
+            );
         }
         for (node, instance) in list(root, "instances").iter().zip(&scene.instances) {
             let (prototype, material) = (&instance.prototype, instance.material.as_deref());
@@ -438,6 +445,10 @@ impl Reader<'_> {
                 radius: number(node, "radius")?,
             },
             "mesh" => Geometry::Mesh(self.mesh(node)?),
+            "gltf" => Geometry::Gltf {
+                file: text(node, "file")?.into(),
+                transform: to_world(node)?,
+            },
             "ply" => Geometry::Ply {
                 file: text(node, "file")?.into(),
                 transform: to_world(node)?,
@@ -448,6 +459,7 @@ impl Reader<'_> {
             geometry,
             material: text(node, "material").map(String::from),
             emission: spectrum(node, "emission"),
+            emission_texture: text(node, "emission_texture").map(String::from),
             two_sided: flag(node, "two_sided").unwrap_or(false),
             interior: text(node, "interior").map(String::from),
             priority: match node.get("priority") {

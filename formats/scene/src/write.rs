@@ -63,7 +63,7 @@ impl Scene {
         }
         let shapes = self.shapes.iter_mut();
         for shape in shapes.chain(self.prototypes.values_mut().flatten()) {
-            if let Geometry::Ply { file, .. } = &mut shape.geometry {
+            if let Geometry::Ply { file, .. } | Geometry::Gltf { file, .. } = &mut shape.geometry {
                 rebase.path(file);
             }
         }
@@ -402,6 +402,11 @@ fn shape(s: &Shape) -> Json {
             put_transform(&mut out, &m.transform);
             out
         }
+        Geometry::Gltf { file, transform } => {
+            let mut out = json!({"type": "gltf", "file": file});
+            put_transform(&mut out, transform);
+            out
+        }
         Geometry::Ply { file, transform } => {
             let mut out = json!({"type": "ply", "file": file});
             put_transform(&mut out, transform);
@@ -413,6 +418,9 @@ fn shape(s: &Shape) -> Json {
     }
     if let Some(emission) = s.emission {
         out["emission"] = spectrum(emission);
+        if let Some(texture) = &s.emission_texture {
+            out["emission_texture"] = json!(texture);
+        }
         if s.two_sided {
             out["two_sided"] = json!(true);
         }

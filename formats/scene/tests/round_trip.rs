@@ -288,6 +288,7 @@ fn large_meshes_are_written_line_by_line() {
         geometry: Geometry::Mesh(mesh),
         material: None,
         emission: Some([1.0; 3]),
+        emission_texture: None,
         two_sided: false,
         interior: None,
         priority: 0,

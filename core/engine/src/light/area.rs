@@ -2,6 +2,7 @@
 
 use super::{Distribution, per_solid_angle};
 use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh};
+use crate::texture::Binding;
 use resolvent_api::Spectrum;
 use resolvent_api::math::{Frame, Vec3, warp};
 use resolvent_api::vertex::{LightSample, NONE};
@@ -21,6 +22,9 @@ pub struct Area {
     pub area: f32,
     /// Further magnitudes of terms that made its coordinates, see [`AreaPoint::size`].
     pub terms: Vec3,
+    /// What the radiance is multiplied with over the surface, and its mean; for meshes and parallelograms. Points are chosen
+    /// without regard to it.
+    texture: Option<(Binding, Spectrum)>,
 }
 
 /// A point on an emitting shape.
@@ -34,6 +38,8 @@ pub struct AreaPoint {
     pub ng: Vec3,
     /// Primitive of the shape.
     pub prim: u32,
+    /// Texture coordinates, on meshes and parallelograms; zero elsewhere.
+    pub uv: [f32; 2],
 }
 
 impl AreaPoint {
@@ -73,6 +79,7 @@ impl Area {
             form: AreaShape::Quad(quad),
             area,
             terms: Vec3::ZERO,
+            texture: None,
         }
     }
 
@@ -86,6 +93,7 @@ impl Area {
             form: AreaShape::Sphere(sphere),
             area,
             terms: Vec3::ZERO,
+            texture: None,
         }
     }
 
@@ -98,6 +106,7 @@ impl Area {
             form: AreaShape::Disk(disk, Frame::around(disk.normal)),
             area: PI * disk.radius * disk.radius,
             terms: Vec3::ZERO,
+            texture: None,
         }
     }
 
@@ -112,6 +121,7 @@ impl Area {
             form: AreaShape::Cylinder(cylinder, Frame::around((axis / length).as_vec3())),
             area: (2.0 * std::f64::consts::PI * f64::from(cylinder.radius) * length) as f32,
             terms: Vec3::ZERO,
+            texture: None,
         }
     }
 
@@ -134,6 +144,7 @@ impl Area {
             form: AreaShape::Mesh(mesh, distribution),
             area,
             terms: Vec3::ZERO,
+            texture: None,
         }
     }
 
@@ -143,10 +154,35 @@ impl Area {
         self
     }
 
-    /// Radiant power, W.
+    /// The same with its radiance multiplied by a texture.
+    pub fn textured(mut self, texture: Option<Binding>) -> Self {
+        self.texture = texture.map(|t| {
+            let [r, g, b, _] = t.mean();
+            (t, Spectrum::rgb(r, g, b))
+        });
+        self
+    }
+
+    /// Emitted radiance at texture coordinates.
+    #[inline]
+    pub fn radiance_at(&self, uv: [f32; 2]) -> Spectrum {
+        match &self.texture {
+            None => self.radiance,
+            Some((texture, _)) => {
+                let [r, g, b, _] = texture.at(uv);
+                self.radiance * Spectrum::rgb(r, g, b)
+            }
+        }
+    }
+
+    /// Radiant power, W; of textured ones approximately, by the mean of the whole image.
     pub fn power(&self, lanes: u32) -> f32 {
         let sides = if self.two_sided { 2.0 } else { 1.0 };
-        sides * PI * self.area * self.radiance.mean(lanes)
+        let radiance = match &self.texture {
+            None => self.radiance,
+            Some((_, mean)) => self.radiance * *mean,
+        };
+        sides * PI * self.area * radiance.mean(lanes)
     }
 
     /// Chooses a point for `from`; `None` if it shows nothing there.
@@ -161,11 +197,13 @@ impl Area {
 
     /// Chooses a point, uniform in area.
     pub fn point(&self, u: [f32; 2]) -> Option<AreaPoint> {
+        let mut uv = [0.0; 2];
         let (p, size, ng, prim) = match &self.form {
             AreaShape::Quad(q) => {
                 let p = q.corner + q.edge_u * u[0] + q.edge_v * u[1];
                 let ng = q.edge_u.cross(q.edge_v).normalize_or_zero();
                 let size = q.corner.abs() + q.edge_u.abs() + q.edge_v.abs();
+                uv = u;
                 (p, size, ng, u32::from(u[1] > u[0]))
             }
             AreaShape::Mesh(mesh, distribution) => {
@@ -179,6 +217,14 @@ impl Area {
                 let p = a + (b - a) * s + (c - a) * t;
                 let ng = (b - a).cross(c - a).normalize_or_zero();
                 let size = a.abs() + (b - a).abs() + (c - a).abs();
+                // Without coordinates they are the weights of the corners, as where a ray hits.
+                uv = match &mesh.uvs[..] {
+                    [] => [s, t],
+                    uvs => {
+                        let [a, b, c] = mesh.indices[i].map(|i| uvs[i as usize]);
+                        (a + (b - a) * s + (c - a) * t).into()
+                    }
+                };
                 (p, size, ng, i as u32)
             }
             AreaShape::Sphere(s) => {
@@ -201,7 +247,13 @@ impl Area {
             }
         };
         let size = size + self.terms;
-        Some(AreaPoint { p, size, ng, prim })
+        Some(AreaPoint {
+            p,
+            size,
+            ng,
+            prim,
+            uv,
+        })
     }
 
     fn finish(&self, from: Vec3, at: &AreaPoint, density: f32) -> Option<LightSample> {
@@ -215,7 +267,7 @@ impl Area {
         Some(LightSample {
             wi: (d / distance).into(),
             distance,
-            radiance: self.radiance,
+            radiance: self.radiance_at(at.uv),
             density,
             light: NONE,
             flags: 0,
@@ -246,6 +298,7 @@ impl Area {
             size: s.center.abs() + Vec3::splat(s.radius) + self.terms,
             ng: n,
             prim: 0,
+            uv: [0.0; 2],
         };
         self.finish(from, &at, 1.0 / (2.0 * PI * one_minus_cos))
     }

@@ -79,11 +79,13 @@ impl Lights {
                 vertex.frame = frame;
                 vertex.primitive = [area.shape, at.prim];
                 vertex.wo = d.into();
-                vertex.emitted = area.radiance;
+                let radiance = area.radiance_at(at.uv);
+                vertex.uv = at.uv;
+                vertex.emitted = radiance;
                 let o = offset_origin(at.p, at.error(), at.ng, d);
                 let per_area = probability / area.area;
                 // The cosine is both in the flux and in the density.
-                let weight = area.radiance / (per_area * density);
+                let weight = radiance / (per_area * density);
                 Some(ray(o, d, per_area, density * local.z, weight))
             }
             Light::Point {

@@ -10,12 +10,13 @@ use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
 use crate::light::{Area, BoundingSphere, ImageEnvironment, Light, Lights, Spot, SunSky};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
-use crate::texture::{ReadImage, Textures};
+use crate::texture::{Binding, ReadImage, Textures};
 use glam::{DMat3, DVec3};
 use resolvent_api::abi::scene_traits;
 use resolvent_api::medium::medium_traits;
 use resolvent_api::{Aabb, Affine, PluginKind, Spectrum, Vec3};
 use resolvent_scene as describe;
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -71,6 +72,8 @@ impl Scene {
     pub fn build(scene: &describe::Scene, registry: &Registry) -> Result<Self> {
         let start = Instant::now();
         let lanes = RGB_LANES;
+        let expanded = with_models(scene)?;
+        let scene = &*expanded;
         let wide: Vec<Wide> = scene
             .shapes
             .iter()
@@ -172,7 +175,9 @@ impl Scene {
             let mut surface = behind(described, None)?;
             if let Some(e) = described.emission.filter(|_| emits(described)) {
                 let (index, sides) = (shapes.len() as u32, described.two_sided);
-                lights.push(Light::Area(area(&shape, index, spectrum(e), sides)));
+                let glow = emission_texture(described, scene, &textures)?;
+                let emitter = area(&shape, index, spectrum(e), sides).textured(glow);
+                lights.push(Light::Area(emitter));
                 surface.light = Some(lights.len() as u32 - 1);
                 surface.null = false;
             }
@@ -229,8 +234,9 @@ impl Scene {
                 groups.surfaces(accel, &placed, &mut behind, |described, shape, at, size| {
                     let radiance = spectrum(described.emission.unwrap_or_default());
                     let emitter = area(shape, at, radiance, described.two_sided);
-                    lights.push(Light::Area(emitter.made_of(size)));
-                    lights.len() as u32 - 1
+                    let glow = emission_texture(described, scene, &textures)?;
+                    lights.push(Light::Area(emitter.made_of(size).textured(glow)));
+                    Ok(lights.len() as u32 - 1)
                 })?
             }
             _ => Copies::default(),
@@ -345,6 +351,18 @@ impl Scene {
     }
 }
 
+/// The scene with the meshes of its models, said what could not be shown as it is meant.
+fn with_models(scene: &describe::Scene) -> Result<Cow<'_, describe::Scene>> {
+    if !resolvent_gltf::has_models(scene) {
+        return Ok(Cow::Borrowed(scene));
+    }
+    let mut expanded = scene.clone();
+    let warnings =
+        resolvent_gltf::expand(&mut expanded).map_err(|e| Error::Input(e.to_string()))?;
+    warnings.into_iter().for_each(warn);
+    Ok(Cow::Owned(expanded))
+}
+
 /// Index of the material `name`, made on first use.
 fn material(
     name: &str,
@@ -422,6 +440,20 @@ fn centre(scene: &describe::Scene, shapes: &[Wide], groups: &Groups, camera: DVe
     } else {
         DVec3::ZERO
     }
+}
+
+/// What a shape's emission is multiplied with.
+fn emission_texture(
+    shape: &describe::Shape,
+    scene: &describe::Scene,
+    textures: &Textures,
+) -> Result<Option<Binding>> {
+    let Some(name) = &shape.emission_texture else {
+        return Ok(None);
+    };
+    let texture = textures.get(name, scene)?;
+    // No light is negative, and none so bright that sums of it overflow.
+    Ok(Some(Binding::new(texture, 0.0, 1e30)))
 }
 
 fn area(shape: &Shape, index: u32, radiance: Spectrum, two_sided: bool) -> Area {

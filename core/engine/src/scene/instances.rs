@@ -134,7 +134,7 @@ impl<'s> Groups<'s> {
         accel: &Accel,
         placed: &[Instance],
         mut surface: impl FnMut(&'s describe::Shape, Option<&'s str>) -> Result<Surface>,
-        mut light: impl FnMut(&'s describe::Shape, &Shape, u32, Vec3) -> u32,
+        mut light: impl FnMut(&'s describe::Shape, &Shape, u32, Vec3) -> Result<u32>,
     ) -> Result<Copies> {
         let mut copies = Copies::default();
         let mut known: HashMap<(usize, Option<&str>), u32> = HashMap::new();
@@ -173,7 +173,7 @@ impl<'s> Groups<'s> {
                     + to_world.columns[1].abs() * reach.y
                     + to_world.columns[2].abs() * reach.z;
                 let at = accel.first_shape(number as u32) + k as u32;
-                surface.light = Some(light(described, &shape, at, size.as_vec3()));
+                surface.light = Some(light(described, &shape, at, size.as_vec3())?);
                 surface.null = false;
             }
             copies.add(surfaces);

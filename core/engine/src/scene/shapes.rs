@@ -61,6 +61,10 @@ impl Wide {
                     .collect(),
                 m.indices.clone(),
             ),
+            // Building replaces models by their meshes before it comes to shapes.
+            Geometry::Gltf { file, .. } => {
+                return Err(Error::Input(format!("{file}: the model was not read")));
+            }
             Geometry::Ply { file, transform } => {
                 let m = resolvent_ply::read(scene.resolve(file))
                     .map_err(|e| Error::Input(e.to_string()))?;

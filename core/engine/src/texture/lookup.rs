@@ -66,7 +66,7 @@ impl Texture {
         let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
         // The image's rows go down, its coordinates up.
         let (x, y) = (self.along(0, x), self.along(1, 1.0 - y));
-        let mut v = if self.nearest {
+        let v = if self.nearest {
             self.texel(x.nearest(), y.nearest())
         } else {
             let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
@@ -76,28 +76,30 @@ impl Texture {
             let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
             [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
         };
+        self.finish(v)
+    }
+
+    /// Mean over the texels of red, green, blue and alpha after `bound`.
+    pub fn mean(&self, bound: impl Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
+        let mut sum = [0f64; 4];
+        for y in 0..self.texels.height {
+            for x in 0..self.texels.width {
+                let v = bound(self.finish(self.texel(x, y)));
+                (0..4).for_each(|i| sum[i] += f64::from(v[i]));
+            }
+        }
+        let n = (self.texels.width * self.texels.height) as f64;
+        sum.map(|s| (s / n) as f32)
+    }
+
+    /// Channel, factor and offset.
+    #[inline(always)]
+    fn finish(&self, mut v: [f32; 4]) -> [f32; 4] {
         if let Some(c) = self.channel {
             v = [v[c], v[c], v[c], v[3]];
         }
         let [r, g, b] = [0, 1, 2].map(|i| v[i] * self.scale[i] + self.bias[i]);
         [r, g, b, v[3]]
-    }
-
-    /// Mean of red, green and blue over the texels and the mean of alpha: what bilinear interpolation of the repeated image
-    /// has as its mean over the unit square.
-    pub fn mean(&self) -> [f32; 4] {
-        let mut sum = [0f64; 4];
-        for y in 0..self.texels.height {
-            for x in 0..self.texels.width {
-                let t = self.texel(x, y);
-                let t = self.channel.map_or(t, |c| [t[c], t[c], t[c], t[3]]);
-                (0..4).for_each(|i| sum[i] += f64::from(t[i]));
-            }
-        }
-        let n = (self.texels.width * self.texels.height) as f64;
-        let mean = sum.map(|s| (s / n) as f32);
-        let [r, g, b] = [0, 1, 2].map(|i| mean[i] * self.scale[i] + self.bias[i]);
-        [r, g, b, mean[3]]
     }
 
     #[inline(always)]
@@ -392,7 +394,7 @@ mod tests {
         t.bias = [0.0, 1.0, 0.125];
         let grey = Texture::new(texels.clone(), &t);
         assert_eq!(grey.at([0.25, 0.0]), [0.5, 0.75, 0.125, 0.5]);
-        assert_eq!(grey.mean(), [1.0, 0.5, 0.125, 0.75]);
+        assert_eq!(grey.mean(|v| v), [1.0, 0.5, 0.125, 0.75]);
         t.channel = Some(TextureChannel::Alpha);
         let alpha = Texture::new(texels, &t);
         assert_eq!(alpha.at([0.25, 0.0]), [1.0, 0.5, 0.125, 0.5]);

@@ -25,7 +25,16 @@ impl Binding {
     /// Red, green, blue and alpha: finite, and all but alpha within the parameter's range.
     #[inline]
     pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        let [r, g, b, a] = self.texture.at(uv);
+        self.bounded(self.texture.at(uv))
+    }
+
+    /// Mean over the texels of the image.
+    pub fn mean(&self) -> [f32; 4] {
+        self.texture.mean(|v| self.bounded(v))
+    }
+
+    #[inline(always)]
+    fn bounded(&self, [r, g, b, a]: [f32; 4]) -> [f32; 4] {
         let [r, g, b] = [r, g, b].map(|v| bounded(v, self.min, self.max));
         [r, g, b, bounded(a, f32::MIN, f32::MAX)]
     }
