@@ -11,6 +11,7 @@ use std::path::PathBuf;
 const EXAMPLES: &str = "\
 Examples:
   resolvent render cloud.vdb -o cloud.png          a VDB file, with camera and light chosen for it
+  resolvent render model.glb -o model.png          a glTF model, with its own camera and lights if it has some
   resolvent render scene.json -o out.exr -o out.png --spp 256
   resolvent info cloud.vdb                         its grids, bounds and optical thickness
   resolvent compare out.exr reference.exr          is the difference more than noise?
@@ -30,9 +31,9 @@ pub struct Args {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a scene, or a VDB file as it is
+    /// Render a scene, or a VDB file or glTF model as it is
     Render(Box<Render>),
-    /// Say what is in a VDB file, a scene or an EXR image
+    /// Say what is in a VDB file, a glTF model, a scene or an EXR image
     Info(Info),
     /// Compare an image with a reference
     Compare(Compare),
@@ -56,7 +57,7 @@ Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctr
 #[derive(Debug, ClapArgs)]
 #[command(after_help = RENDER_EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
-    /// A scene (.json) or an OpenVDB file (.vdb)
+    /// A scene (.json), an OpenVDB file (.vdb) or a glTF model (.gltf, .glb)
     pub input: PathBuf,
     /// Picture to write, .exr or .png; may be given several times [default: the input's name with .exr, in the current
     /// folder]
@@ -106,7 +107,7 @@ pub struct Render {
     #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic, help_heading = "Picture")]
     pub tone_map: ToneCurve,
 
-    /// What to choose instead of guessing, for VDB files
+    /// What to choose instead of guessing, for VDB files and models
     #[command(flatten)]
     pub guesses: Guesses,
 
@@ -124,9 +125,9 @@ pub struct Render {
     pub quiet: bool,
 }
 
-/// Options that replace guesses about a VDB file.
+/// Options that replace guesses about a VDB file or a model.
 #[derive(Debug, Default, ClapArgs)]
-#[command(next_help_heading = "VDB files (each replaces a guess)")]
+#[command(next_help_heading = "VDB files and models (each replaces a guess)")]
 pub struct Guesses {
     /// Grid of densities
     #[arg(long, value_name = "NAME")]
@@ -175,26 +176,38 @@ pub struct Guesses {
 impl Guesses {
     /// The first option given, for inputs that take none.
     pub fn given(&self) -> Option<&'static str> {
-        let all = [
+        self.of_volumes().or_else(|| self.of_all())
+    }
+
+    /// The first option given that only volumes take.
+    pub fn of_volumes(&self) -> Option<&'static str> {
+        first(&[
             ("--grid", self.grid.is_some()),
             ("--density-scale", self.density_scale.is_some()),
             ("--optical-thickness", self.optical_thickness.is_some()),
             ("--albedo", self.albedo.is_some()),
             ("--g", self.g.is_some()),
+            ("--temperature-grid", self.temperature_grid.is_some()),
+            ("--flame-grid", self.flame_grid.is_some()),
+            ("--emission-scale", self.emission_scale.is_some()),
+        ])
+    }
+
+    fn of_all(&self) -> Option<&'static str> {
+        first(&[
             ("--sun", self.sun.is_some()),
             ("--sun-irradiance", self.sun_irradiance.is_some()),
             ("--sky", self.sky.is_some()),
             ("--camera", self.camera.is_some()),
             ("--fov", self.fov.is_some()),
             ("--up", self.up.is_some()),
-            ("--temperature-grid", self.temperature_grid.is_some()),
-            ("--flame-grid", self.flame_grid.is_some()),
-            ("--emission-scale", self.emission_scale.is_some()),
-        ];
-        all.into_iter()
-            .find(|(_, given)| *given)
-            .map(|(name, _)| name)
+        ])
     }
+}
+
+/// The name of the first that is given.
+fn first(all: &[(&'static str, bool)]) -> Option<&'static str> {
+    all.iter().find(|(_, given)| *given).map(|(name, _)| *name)
 }
 
 /// The axis that is up.
@@ -257,7 +270,7 @@ pub enum ToneCurve {
     after_help = "Examples:\n  resolvent info cloud.vdb\n  resolvent info scene.json\n  resolvent info out.exr --json"
 )]
 pub struct Info {
-    /// A VDB file, a scene or an EXR image
+    /// A VDB file, a glTF model, a scene or an EXR image
     pub file: PathBuf,
     /// Print JSON
     #[arg(long)]

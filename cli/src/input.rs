@@ -13,6 +13,8 @@ pub enum Kind {
     Vdb,
     /// An OpenEXR image.
     Exr,
+    /// A glTF model.
+    Gltf,
 }
 
 /// First bytes of OpenVDB files.
@@ -29,6 +31,7 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
             "json" => Some(Kind::Scene),
             "vdb" => Some(Kind::Vdb),
             "exr" => Some(Kind::Exr),
+            "gltf" | "glb" => Some(Kind::Gltf),
             _ => None,
         });
     let failed = |e: std::io::Error| input(format!("{}: {e}", path.display()));
@@ -48,11 +51,13 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
         Ok(Kind::Vdb)
     } else if first == EXR_MAGIC {
         Ok(Kind::Exr)
+    } else if first == *b"glTF" {
+        Ok(Kind::Gltf)
     } else if first.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
         Ok(Kind::Scene)
     } else {
         Err(input(format!(
-            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb)",
+            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb) nor a glTF model (.gltf, .glb)",
             path.display()
         )))
     }

@@ -132,10 +132,10 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     Ok(Code::Done)
 }
 
-/// An error of the scene that was guessed for a volume has no place in a file: then it names the volume.
+/// An error of the scene that was guessed for a volume or a model has no place in a file: then it names that.
 fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
     let (text, path) = (error.to_string(), a.input.display().to_string());
-    if kind == Kind::Vdb && !text.contains(&path) {
+    if matches!(kind, Kind::Vdb | Kind::Gltf) && !text.contains(&path) {
         return input(format!("{path}: {text}"));
     }
     input(text)
@@ -147,15 +147,16 @@ fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
         Kind::Scene => {
             if let Some(option) = a.guesses.given() {
                 return Err(input(format!(
-                    "{option} is for VDB files; {} is a scene, which says this itself",
+                    "{option} is for VDB files and models; {} is a scene, which says this itself",
                     a.input.display()
                 )));
             }
             describe::Scene::read(&a.input).map_err(input)
         }
         Kind::Vdb => crate::guess::scene(&a.input, a),
+        Kind::Gltf => crate::guess::model(&a.input, a),
         Kind::Exr => Err(input(format!(
-            "{}: is an image; render takes a scene (.json) or an OpenVDB file (.vdb)",
+            "{}: is an image; render takes a scene (.json), an OpenVDB file (.vdb) or a glTF model (.gltf, .glb)",
             a.input.display()
         ))),
     }

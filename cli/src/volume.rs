@@ -182,7 +182,7 @@ fn outline(transform: &Transform, topology: &Topology, masses: &[Mass], max: f64
                 t.origin.map(|o| o.saturating_add(t.dim as i32 - 1)),
             ]
         });
-    let directions: Vec<[f64; 3]> = (0..DIRECTIONS).map(spread).collect();
+    let directions: Vec<[f64; 3]> = (0..DIRECTIONS).map(|i| spread(i, DIRECTIONS)).collect();
     let mut best = vec![(f64::NEG_INFINITY, [0.0; 3]); DIRECTIONS];
     for corner in leaves.chain(tiles).flat_map(corners) {
         let p = transform.to_world(corner);
@@ -196,9 +196,9 @@ fn outline(transform: &Transform, topology: &Topology, masses: &[Mass], max: f64
     best.into_iter().map(|(_, p)| p).collect()
 }
 
-/// Direction `i` of a Fibonacci lattice on the sphere.
-fn spread(i: usize) -> [f64; 3] {
-    let z = 1.0 - (2.0 * i as f64 + 1.0) / DIRECTIONS as f64;
+/// Direction `i` of a Fibonacci lattice of `count` on the sphere.
+pub fn spread(i: usize, count: usize) -> [f64; 3] {
+    let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
     let angle = i as f64 * std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let r = (1.0 - z * z).sqrt();
     [r * angle.cos(), r * angle.sin(), z]

@@ -3,7 +3,6 @@
 use super::{Notes, numbers};
 use crate::args::{Render, Up};
 use crate::info::short;
-use crate::volume::Measures;
 use resolvent_scene::{Camera, Pose};
 
 /// Where the camera stands, seen from the volume: degrees from the front to the right, and above the horizon.
@@ -109,12 +108,11 @@ pub struct Shot {
     pub resolution: [u32; 2],
 }
 
-/// A camera that has the whole volume in its picture.
-pub fn frame(view: &View, m: &Measures, a: &Render, notes: &mut Notes) -> Shot {
+/// A camera that has all of the points in its picture; `what` they are of is for the notes.
+pub fn frame(view: &View, points: &[V], what: &str, a: &Render, notes: &mut Notes) -> Shot {
     let g = &a.guesses;
     let fov = g.fov.map_or(FOV, |f| f.min(179.0));
     let asked = a.resolution.map(|r| r.0);
-    let points = &m.outline;
     // Extent across the view, as from far away.
     let extent = |d: V| {
         let along: Vec<f64> = points.iter().map(|p| dot(*p, d)).collect();
@@ -155,7 +153,7 @@ pub fn frame(view: &View, m: &Measures, a: &Render, notes: &mut Notes) -> Shot {
         notes.add(
             "--resolution",
             format!("{w}x{h}"),
-            "in the shape of the volume",
+            format!("in the shape of the {what}"),
         );
     }
     if g.camera.is_none() {
@@ -186,6 +184,11 @@ pub fn frame(view: &View, m: &Measures, a: &Render, notes: &mut Notes) -> Shot {
         },
         resolution,
     }
+}
+
+/// The size of a picture of this width over height, whose camera is known.
+pub fn size(aspect: f64) -> [u32; 2] {
+    resolution(aspect)
 }
 
 /// A picture of about [`PIXELS`] pixels with sides that are multiples of 16.

@@ -1,9 +1,12 @@
-//! A scene for a bare volume: every choice follows a stated rule, is printed with the option that replaces it, and can be
+//! A scene for a bare volume or model: every choice follows a stated rule, is printed with the option that replaces it, and can be
 //! saved as a scene.
 
 mod camera;
 mod emission;
 mod grids;
+mod model;
+
+pub use model::scene as model;
 
 use crate::args::{Guesses, Render, Up};
 use crate::console;
@@ -95,7 +98,7 @@ pub fn scene(path: &Path, a: &Render) -> Outcome<Scene> {
 
     let up = up(&file, g, &mut notes);
     let view = camera::View::new(up);
-    let shot = camera::frame(&view, &measures, a, &mut notes);
+    let shot = camera::frame(&view, &measures.outline, "volume", a, &mut notes);
     let lights = lights(&view, g, &mut notes);
     if a.spp.is_none() && a.time.is_none() && a.error.is_none() && a.sample_range.is_none() {
         notes.add("--spp", SPP.to_string(), "more samples, less noise");

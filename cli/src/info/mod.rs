@@ -1,6 +1,7 @@
 //! `resolvent info`.
 
 mod exr;
+mod gltf;
 mod scene;
 mod vdb;
 
@@ -24,6 +25,7 @@ pub fn run(a: &Info) -> Outcome {
         Kind::Vdb => vdb::report(&a.file)?,
         Kind::Scene => scene::report(&a.file)?,
         Kind::Exr => exr::report(&a.file)?,
+        Kind::Gltf => gltf::report(&a.file)?,
     };
     if a.json {
         println!("{:#}", report.json);

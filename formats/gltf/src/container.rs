@@ -2,6 +2,7 @@
 
 use gltf::json;
 use serde_json::Value;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::error::Fallible;
 
@@ -68,7 +69,20 @@ pub(crate) fn parse(bytes: &[u8]) -> Fallible<Container<'_>> {
     }
     let root: json::Root = json::deserialize::from_value(raw.clone())
         .map_err(|e| format!("is no glTF 2.0 that can be read: {e}"))?;
-    let document = gltf::Document::from_json(root).map_err(|e| format!("is damaged: {e}"))?;
+    // The crate's validation uses these indices before it checks them.
+    for (i, mesh) in root.meshes.iter().enumerate() {
+        let all = mesh.primitives.iter().flat_map(|p| p.attributes.values());
+        if let Some(a) = all.map(|a| a.value()).find(|a| *a >= root.accessors.len()) {
+            return Err(format!(
+                "is damaged: meshes[{i}]: accessors[{a}] does not exist"
+            ));
+        }
+    }
+    // Whatever else it misses is an error here, not the end of the program.
+    let validate = AssertUnwindSafe(|| gltf::Document::from_json(root));
+    let document = catch_unwind(validate)
+        .map_err(|_| "is damaged: its parts contradict each other".to_owned())?
+        .map_err(|e| format!("is damaged: {e}"))?;
     Ok(Container {
         root: document.into_json(),
         raw,

@@ -64,10 +64,7 @@ impl<'c> Meshes<'c> {
             materials.warn(at, &format!("{mode:?} are no surface and are left out"));
             return Ok(None);
         }
-        let Some(positions) = attribute(Semantic::Positions) else {
-            materials.warn(at, "has no positions and is left out");
-            return Ok(None);
-        };
+        let positions = attribute(Semantic::Positions).ok_or("has no positions")?;
         if p.targets.as_ref().is_some_and(|t| !t.is_empty()) {
             materials.warn("morph targets", "meshes are shown in their base shape");
         }
