@@ -98,6 +98,7 @@ fn kind(light: &Light) -> &'static str {
     match light {
         Light::Distant { .. } => "directional",
         Light::Point { .. } => "point",
-        _ => "spot",
+        Light::Spot { .. } => "spot",
+        _ => "other",
     }
 }

@@ -396,7 +396,7 @@ fn punctual(
             position: pose.point([0.0; 3]),
             intensity: color,
         },
-        "spot" => spot(light, &pose, color, materials)?,
+        "spot" => spot(light, &pose, color)?,
         other => return Err(format!("a light is of the unknown type {other:?}")),
     }))
 }

@@ -327,5 +327,20 @@ fn lights_keep_their_numbers() {
         (to_light[1] + 1.0).abs() < 1e-6 && to_light[0].abs() < 1e-6,
         "{to_light:?}"
     );
+    let Light::Spot {
+        position,
+        direction,
+        intensity,
+        angle_deg,
+        inner_angle_deg,
+    } = &model.lights[2]
+    else {
+        panic!("{:?}", model.lights)
+    };
+    // It is the child of the turned node and shines along its −z: upwards.
+    assert_eq!((*position, *intensity), ([1.0, 2.0, 3.0], [5.0; 3]));
+    assert!((direction[1] - 1.0).abs() < 1e-6, "{direction:?}");
+    assert!((angle_deg - 1f64.to_degrees()).abs() < 1e-6, "{angle_deg}");
+    assert!((inner_angle_deg - 0.2f64.to_degrees()).abs() < 1e-6);
     assert_eq!(model.lights.len(), 3);
 }

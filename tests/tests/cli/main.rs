@@ -5,6 +5,7 @@ mod errors;
 mod hostile;
 #[cfg(unix)]
 mod interrupt;
+mod models;
 mod program;
 mod render;
 mod stats;
