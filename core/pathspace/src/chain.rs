@@ -109,25 +109,41 @@ impl Chain {
         if old.time == self.step {
             return old;
         }
-        self.changed.push((i as u32, old));
+        let proposes = self.step > 1;
         let mut new = old;
-        if new.time < self.last_large {
-            let (a, b) = (self.numbers.uniform2(), self.numbers.uniform2());
-            new.value = [a[0], a[1], b[0], b[1]];
-            new.key = self.numbers.bits();
-            new.time = self.last_large;
+        if proposes && !self.is_large {
+            // First the state before the step: what it becomes must not depend on whether the step is kept, or numbers would be
+            // drawn until they please.
+            self.renew(&mut new);
+            self.drift(&mut new, self.step - 1);
         }
-        // Small steps not yet taken add up to one of their joint variance.
-        let missed = self.step - new.time;
-        if missed > 0 {
-            let spread = self.sigma * (missed as f32).sqrt();
-            for v in &mut new.value {
-                *v = around(*v + spread * normal(&mut self.numbers));
-            }
-        }
-        new.time = self.step;
+        self.changed.push((i as u32, new));
+        self.renew(&mut new);
+        self.drift(&mut new, self.step);
         self.entries[i] = new;
         new
+    }
+
+    /// Draws an entry anew that is older than the last large step.
+    fn renew(&mut self, e: &mut Entry) {
+        if e.time < self.last_large {
+            let (a, b) = (self.numbers.uniform2(), self.numbers.uniform2());
+            e.value = [a[0], a[1], b[0], b[1]];
+            e.key = self.numbers.bits();
+            e.time = self.last_large;
+        }
+    }
+
+    /// Moves an entry by the small steps it has missed; they add up to one of their joint variance.
+    fn drift(&mut self, e: &mut Entry, step: u64) {
+        let missed = step.saturating_sub(e.time);
+        if missed > 0 {
+            let spread = self.sigma * (missed as f32).sqrt();
+            for v in &mut e.value {
+                *v = around(*v + spread * normal(&mut self.numbers));
+            }
+            e.time = step;
+        }
     }
 }
 
@@ -170,6 +186,52 @@ mod tests {
         (0..5)
             .map(|b| c.four(End::Light, b, Purpose::Flight))
             .collect()
+    }
+
+    /// A number that the target depends on, first used after steps that did not: it must not settle where proposals are
+    /// accepted. The chain visits two kinds of states, one blind to the number, with a density of 1 + cos 2πx in the other.
+    #[test]
+    fn late_numbers_are_not_chosen() {
+        let mut c = Chain::new(0.1, 1);
+        let density = |c: &mut Chain| {
+            let kind = c.four(End::Sensor, 0, Purpose::Branch)[0];
+            if kind < 0.5 {
+                return (1.0, None);
+            }
+            let x = c.four(End::Light, 4, Purpose::Scatter)[0];
+            (1.0 + (core::f64::consts::TAU * f64::from(x)).cos(), Some(x))
+        };
+        // Batches of independent chains: time in the second kind, and there below a quarter or above three.
+        let mut shares = [const { Vec::new() }; 2];
+        for key in 0..200 {
+            c.start(key);
+            let (mut f, mut x) = density(&mut c);
+            let (mut second, mut near) = (0.0, 0.0);
+            let n = 4000;
+            for step in 0..n {
+                c.propose(step % 50 == 49);
+                let (g, y) = density(&mut c);
+                if f64::from(c.uniform()) * f < g {
+                    c.accept();
+                    (f, x) = (g, y);
+                } else {
+                    c.reject();
+                }
+                second += f64::from(u8::from(x.is_some()));
+                near += f64::from(u8::from(x.is_some_and(|x| !(0.25..0.75).contains(&x))));
+            }
+            shares[0].push(second / f64::from(n));
+            shares[1].push(near / f64::from(n));
+        }
+        // ∫ over the two quarters of (1 + cos 2πx)/2 = 1/4 + 1/(2π).
+        for (v, expected) in shares
+            .iter()
+            .zip([0.5, 0.25 + 0.5 * core::f64::consts::FRAC_1_PI])
+        {
+            let m = v.iter().sum::<f64>() / 200.0;
+            let s = (v.iter().map(|x| (x - m).powi(2)).sum::<f64>() / 199.0 / 200.0).sqrt();
+            assert!((m - expected).abs() < 4.0 * s, "{m} +- {s}, {expected}");
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events of a path, −1: any number. A limit makes the picture darker than it should be |
-//! | `connections` | float > 0 | 8 | vertices of the light's walk that a vertex of the sensor's is joined to, on average; the picture's mean does not depend on it |
+//! | `connections` | float > 0 | 4 | vertices of the light's walk that a vertex of the sensor's is joined to, on average; the picture's mean does not depend on it |
 //! | `heuristic` | `balance`, `power`, `alone` | `balance` | how the strategies' densities make weights; `alone`: the one strategy asked for is the only one |
 //! | `s`, `t` | int ≥ −1 | −1 | only the strategy with so many vertices from the light and from the sensor, −1: all |
 //!
@@ -43,7 +43,7 @@ impl Plugin for Bidirectional {
             "connections",
             "vertices of the light's walk that a vertex of the sensor's is joined to, on average",
         )
-        .default("8")
+        .default("4")
         .above(0.0)
         .build(),
         Decl::choice(
