@@ -26,7 +26,6 @@ fn broken() {
         ("fails with a reason", &["the thread is lost"]),
         ("adds beyond its tile", &["which is not in its tile"]),
         ("adds far away", &["which is not in its tile"]),
-        ("splats", &["splats light"]),
     ] {
         let f = fault(&walk(mode));
         blames(&f.text, "integrator", &library, words);
