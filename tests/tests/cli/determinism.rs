@@ -2,17 +2,20 @@
 
 use crate::program::{bits, folder, render, scene};
 
-/// Surfaces, several overlapping media, an area light and a sun.
-const SCENES: [&str; 3] = [
+/// Surfaces, several overlapping media, an area light and a sun; walks from lights that fall on any pixel.
+const SCENES: [&str; 4] = [
     "overlap/overlap.json",
     "fog-room/fog-room.json",
     "bench/cloud_sun.json",
+    "caustic/caustic.json",
 ];
+/// Markov chains: each pass of a piece of work runs its own, so parts are other pictures of the same mean.
+const CHAINS: &str = "pinhole/pinhole.json";
 
 #[test]
 fn threads_do_not_change_a_bit() {
     let at = folder("threads");
-    for name in SCENES {
+    for name in SCENES.into_iter().chain([CHAINS]) {
         let with = |threads: &str| {
             let size = ["--resolution", "50x34", "--spp", "20"];
             let aovs = ["--aov", "depth,albedo,normal,variance,samples"];

@@ -19,10 +19,13 @@ fn every_example_renders() {
         assert!(mean(&image) > 0.005, "{name}: {}", mean(&image));
     };
     for name in [
+        "caustic/caustic.json",
         "cloud/cloud.json",
         "fog-room/fog-room.json",
+        "lampshade/lampshade.json",
         "materials/materials.json",
         "overlap/overlap.json",
+        "pinhole/pinhole.json",
     ] {
         with_light(name);
     }
