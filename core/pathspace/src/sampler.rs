@@ -1,6 +1,6 @@
 //! The primary samples of a path: Owen-scrambled Sobol' for the first bounces, hashed numbers beyond.
 //!
-//! Samples come in randomised nets of [`NET`](sobol::NET), which are independent of each other. Every aligned batch of
+//! Samples come in randomised nets of `sobol::NET`, which are independent of each other. Every aligned batch of
 //! [`BATCH`] of them is a net too, and the spread of batches is what errors are estimated from: as if they were independent. In
 //! fact they complement each other, and the mean of many is better than that: the estimate errs on the safe side (measured on
 //! bench/surface_only: 1.3 times the variance at 32 samples, 1.6 times at 256; on bench/box_fog 1.0). Every number is a function of (seed, pixel, sample, bounce, purpose) alone.
