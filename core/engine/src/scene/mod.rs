@@ -3,6 +3,7 @@
 mod build;
 mod instances;
 mod interiors;
+mod lights;
 mod media;
 mod normal_map;
 mod shapes;
