@@ -14,5 +14,6 @@ pub mod measure;
 pub mod mis;
 pub mod roulette;
 pub mod sampler;
+pub mod samples;
 pub mod scatter;
 mod sobol;

@@ -1,41 +1,23 @@
-//! Densities with their measure in the type, and the one conversion between them.
+//! The one conversion between densities per steradian and per area or volume.
 
 use resolvent_api::Vec3;
-use resolvent_api::vertex::{Vertex, VertexKind};
+use resolvent_api::vertex::{Vertex, VertexKind, vertex_flags};
 
-/// A density per steradian.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PdfW(pub f32);
-
-/// A density per area (surfaces) or volume (media): the product measure of path space.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PdfA(pub f32);
-
-impl PdfW {
-    /// The density at `to` of a direction sampled at `from` with this density: p_ω D(to)/|x−y|² (Jakob 2013, eq. 3.14).
-    /// For a vertex at infinity the density stays one per steradian.
-    pub fn at_vertex(self, from: &Vertex, to: &Vertex) -> PdfA {
-        if to.is_infinite() || from.is_infinite() {
-            return PdfA(self.0);
-        }
-        let d = to.position() - from.position();
-        let d2 = d.length_squared();
-        if d2 == 0.0 {
-            return PdfA(0.0);
-        }
-        PdfA(self.0 * to.cosine(d / d2.sqrt()) / d2)
+/// The factor from a density per steradian at `from` to one per area or volume at `to`, which lies in direction `w`:
+/// D(to)/|x−y|² (Jakob 2013, eq. 3.14); 0 for coincident points. A ray from infinity has a density per area across it; towards
+/// infinity densities stay per steradian, and towards a point without extent what they are, probabilities.
+pub fn conversion(from: &Vertex, to: &Vertex, w: Vec3) -> f64 {
+    if to.flags & (vertex_flags::INFINITE | vertex_flags::DELTA) != 0 {
+        return 1.0;
     }
-}
-
-/// The geometry term without visibility and transmittance: D_x(xy) D_y(yx)/|x−y|²; 0 for coincident points.
-pub fn geometry_term(x: &Vertex, y: &Vertex) -> f32 {
-    let d: Vec3 = y.position() - x.position();
-    let d2 = d.length_squared();
-    if d2 == 0.0 {
-        return 0.0;
+    let cosine = f64::from(to.cosine(w));
+    if from.is_infinite() {
+        return cosine;
     }
-    let w = d / d2.sqrt();
-    x.cosine(w) * y.cosine(w) / d2
+    let d2 = (to.position() - from.position())
+        .as_dvec3()
+        .length_squared();
+    if d2 > 0.0 { cosine / d2 } else { 0.0 }
 }
 
 /// True if light can leave `v` in direction `w` and be counted by a smooth density.
@@ -47,7 +29,6 @@ pub fn is_connectible(v: &Vertex) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use resolvent_api::vertex::vertex_flags;
 
     fn vertex(kind: VertexKind, p: [f32; 3]) -> Vertex {
         Vertex {
@@ -63,14 +44,16 @@ mod tests {
     #[test]
     fn converted_densities_integrate_to_the_solid_angle() {
         let from = vertex(VertexKind::Medium, [0.0, 0.0, 0.0]);
-        let uniform = PdfW(0.25 * core::f32::consts::FRAC_1_PI);
+        let uniform = 0.25 * core::f64::consts::FRAC_1_PI;
         let n = 256;
         let (mut sum, mut terms) = (0f64, 0f64);
         for i in 0..n * n {
             let at = |k: usize| 2.0 * (k as f32 + 0.5) / n as f32 - 1.0;
             let to = vertex(VertexKind::Surface, [at(i % n), at(i / n), 1.0]);
-            sum += f64::from(uniform.at_vertex(&from, &to).0);
-            terms += f64::from(geometry_term(&from, &to));
+            let w = to.position().normalize();
+            sum += uniform * conversion(&from, &to, w);
+            // The geometry term is the same in both directions.
+            terms += f64::from(from.cosine(w)) * conversion(&from, &to, w);
         }
         let area = 4.0 / (n * n) as f64;
         let expected = (1.0f64 / 2.0).asin() / core::f64::consts::PI;
@@ -83,8 +66,9 @@ mod tests {
         let from = vertex(VertexKind::Medium, [0.0; 3]);
         let mut sky = vertex(VertexKind::Emitter, [0.0, 1.0, 0.0]);
         sky.flags = vertex_flags::INFINITE;
-        assert_eq!(PdfW(0.3).at_vertex(&from, &sky), PdfA(0.3));
-        assert_eq!(PdfW(0.3).at_vertex(&from, &from), PdfA(0.0));
-        assert_eq!(geometry_term(&from, &from), 0.0);
+        let w = sky.position();
+        assert_eq!(0.3 * conversion(&from, &sky, w), 0.3);
+        assert_eq!(0.3 * conversion(&from, &from, w), 0.0);
+        assert_eq!(f64::from(from.cosine(w)) * conversion(&from, &from, w), 0.0);
     }
 }

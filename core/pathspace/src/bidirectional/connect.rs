@@ -1,10 +1,12 @@
 //! Connections: the strategies of a path, their contribution and their weight.
 
 use super::draws::{Draws, End};
-use super::subpath::{Subpath, conversion};
+use super::subpath::{Subpath, towards};
 use crate::mis::{self, Heuristic, Strategies};
 use crate::sampler::Purpose;
-use crate::{measure, roulette, scatter};
+use crate::{features, measure, roulette, scatter};
+use measure::conversion;
+use resolvent_api::abi::PixelSample;
 use resolvent_api::integrator::Outcome;
 use resolvent_api::operator::{Mode, ScatterEval};
 use resolvent_api::vertex::{Edge, LightSample, NONE, vertex_flags};
@@ -55,6 +57,28 @@ impl Bidirectional {
             heuristic,
             edge: mis::clear(0.0),
         }
+    }
+
+    /// Walks from the sensor through a sample of `pixel` until `limit` vertices; the sample has what the camera's ray tells
+    /// beside light (`wanted`: with features).
+    pub fn look<const CHROMATIC: bool, D: Draws>(
+        &mut self,
+        scene: &SceneView<'_>,
+        pixel: [u32; 2],
+        draws: &mut D,
+        limit: usize,
+        wanted: bool,
+    ) -> Outcome<PixelSample> {
+        let mut sample = PixelSample::default();
+        self.sensor.clear();
+        let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
+        if let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? {
+            self.sensor
+                .from_sensor::<CHROMATIC, _>(scene, &ray, draws, limit)?;
+            let (met, edge) = self.sensor.first();
+            features::fill(&mut sample, met, &edge, scene.lanes(), wanted);
+        }
+        Ok(sample)
     }
 
     /// Strategy s = 0: the walk from the sensor met a light at its vertex `t − 1`.
@@ -123,21 +147,16 @@ impl Bidirectional {
         };
         let x = emitter(&light);
         let [position, direction] = scene.emission_density(&x, z)?;
+        let to_light = conversion(z, &x, wi);
+        // Scattering never finds a light without extent.
         let delta = light.flags & vertex_flags::DELTA != 0;
-        let to_light = if delta { 1.0 } else { conversion(z, &x, wi) };
+        let scattered = if delta { 0.0 } else { e.forward };
         let across = Across {
             light: [
                 f64::from(direction) * conversion(&x, z, -wi),
                 reverse_at(&e, z, &nodes[t - 2].vertex),
             ],
-            sensor: [
-                if delta {
-                    0.0
-                } else {
-                    f64::from(e.forward) * to_light
-                },
-                0.0,
-            ],
+            sensor: [f64::from(scattered) * to_light, 0.0],
         };
         let chosen = f64::from(light.density) * to_light;
         let p = node.beta.p * mis::track(&edge);
@@ -192,7 +211,7 @@ impl Bidirectional {
         let f = ny.beta.f * nz.beta.f * ey.f * ez.f * edge.value * (1.0 / d2) as f32;
         let p = ny.beta.p * nz.beta.p * mis::track(&edge);
         self.assemble(s, t, &across, 0.0, Some(&edge));
-        self.start_from_light(scene)?;
+        self.start_from_light(scene);
         Ok(self.weigh(s, f, p, scene.lanes()))
     }
 
@@ -253,7 +272,7 @@ impl Bidirectional {
                 ],
             };
             self.assemble(s, 1, &across, 0.0, Some(&edge));
-            self.start_from_light(scene)?;
+            self.start_from_light(scene);
             self.weigh(s, f, p, scene.lanes())
         };
         Ok(Some(Splat {
@@ -262,21 +281,12 @@ impl Bidirectional {
         }))
     }
 
-    /// Density of the light's vertex when it is chosen as seen from the next, for strategies s ≥ 2.
-    fn start_from_light(&mut self, scene: &SceneView<'_>) -> Outcome<()> {
-        let ys = self.light.nodes();
-        let (x, y) = (&ys[0].vertex, &ys[1].vertex);
-        let delta = x.flags & vertex_flags::DELTA != 0;
-        let w = towards(x, y);
-        self.strategies.chosen = if delta {
-            f64::from(scene.light_density(y, x))
-        } else {
-            f64::from(scene.light_density(y, x)) * conversion(y, x, -w)
-        };
-        if delta {
+    /// What strategies s ≥ 2 know of the light's vertex beyond the walk.
+    fn start_from_light(&mut self, scene: &SceneView<'_>) {
+        self.strategies.chosen = self.light.chosen(scene);
+        if self.light.nodes()[0].vertex.flags & vertex_flags::DELTA != 0 {
             self.strategies.from_sensor[0] = 0.0;
         }
-        Ok(())
     }
 
     /// Fills the densities of the path of strategy (s, t).
@@ -338,17 +348,6 @@ impl Bidirectional {
         } else {
             Spectrum::ZERO
         }
-    }
-}
-
-/// Unit direction from one vertex to the next; towards a vertex at infinity, or away from it.
-fn towards(from: &Vertex, to: &Vertex) -> Vec3 {
-    if from.is_infinite() {
-        -from.position()
-    } else if to.is_infinite() {
-        to.position()
-    } else {
-        (to.position() - from.position()).normalize_or_zero()
     }
 }
 

@@ -10,4 +10,4 @@ mod subpath;
 
 pub use connect::{Bidirectional, Splat};
 pub use draws::{Draws, End, NetDraws};
-pub use subpath::{Node, Subpath, conversion};
+pub use subpath::{Node, Subpath};

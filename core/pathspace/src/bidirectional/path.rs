@@ -1,7 +1,7 @@
 //! Whole paths, recomputed from scratch in double precision: what tests hold the incremental sums against.
 
-use super::subpath::conversion;
 use super::{Bidirectional, Node};
+use crate::measure::conversion;
 use crate::mis::{self, Strategies};
 use crate::scatter;
 use resolvent_api::integrator::Outcome;
@@ -118,11 +118,7 @@ impl Path {
         let [position, direction] = scene.emission_density(&x[0], &x[1])?;
         out.from_light[0] = f64::from(position);
         out.from_light[1] = f64::from(direction) * conversion(&x[0], &x[1], w(0));
-        out.chosen = f64::from(scene.light_density(&x[1], &x[0]));
-        let delta = x[0].flags & vertex_flags::DELTA != 0;
-        if !delta {
-            out.chosen *= conversion(&x[1], &x[0], w(0));
-        }
+        out.chosen = f64::from(scene.light_density(&x[1], &x[0])) * conversion(&x[1], &x[0], w(0));
         out.from_sensor[n - 1] = self.importance * conversion(&x[n], &x[n - 1], w(n - 1));
         for i in 1..n {
             let (to_sensor, to_light) = if i < s {
@@ -135,7 +131,7 @@ impl Path {
             out.from_light[i + 1] = f64::from(to_sensor) * conversion(&x[i], &x[i + 1], w(i));
             out.from_sensor[i - 1] = f64::from(to_light) * conversion(&x[i], &x[i - 1], w(i - 1));
         }
-        if delta {
+        if x[0].flags & vertex_flags::DELTA != 0 {
             // Scattering never finds it.
             out.from_sensor[0] = 0.0;
         }

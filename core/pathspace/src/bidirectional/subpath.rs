@@ -1,7 +1,8 @@
 //! Subpaths as data: the vertices of a walk from the sensor or from a light, with the densities at which either end finds them.
 
 use super::draws::{Draws, End};
-use crate::mis::Throughput;
+use crate::measure::conversion;
+use crate::mis::{self, Throughput};
 use crate::sampler::Purpose;
 use crate::{roulette, scatter};
 use resolvent_api::integrator::Outcome;
@@ -27,15 +28,6 @@ pub struct Node {
     /// The walk was turned by a delta lobe here: nothing can be connected to.
     pub delta: bool,
 }
-
-static CLEAR: Edge = Edge {
-    value: Spectrum::ONE,
-    track: Spectrum::ONE,
-    ratio: Spectrum::ONE,
-    emitted: Spectrum::ZERO,
-    length: 0.0,
-    media: 0,
-};
 
 impl Node {
     fn new() -> Self {
@@ -63,6 +55,8 @@ pub struct Subpath {
     pub last_emitted: Spectrum,
     /// Edges walked.
     pub edges: usize,
+    /// Density of the start when it is chosen as seen from the vertex after it (walks from a light), once it was asked for.
+    chosen: Option<f64>,
 }
 
 impl Subpath {
@@ -72,9 +66,9 @@ impl Subpath {
     }
 
     /// The vertex after the start, if one was met, and the edge towards it.
-    pub fn first(&self) -> (Option<&Vertex>, &Edge) {
+    pub fn first(&self) -> (Option<&Vertex>, Edge) {
         let met = (self.len > 1).then(|| &self.nodes[1].vertex);
-        (met, self.nodes.get(1).map_or(&CLEAR, |n| &n.edge))
+        (met, self.nodes.get(1).map_or(mis::clear(0.0), |n| n.edge))
     }
 
     /// Number of vertices.
@@ -93,6 +87,16 @@ impl Subpath {
         self.emitted = Spectrum::ZERO;
         self.last_emitted = Spectrum::ZERO;
         self.edges = 0;
+        self.chosen = None;
+    }
+
+    /// Density per area, or probability, of the start of a walk from a light when it is chosen as seen from the vertex after it:
+    /// of strategy 1. The same for all connections of the walk.
+    pub(super) fn chosen(&mut self, scene: &SceneView<'_>) -> f64 {
+        let (x, y) = (&self.nodes[0].vertex, &self.nodes[1].vertex);
+        *self.chosen.get_or_insert_with(|| {
+            f64::from(scene.light_density(y, x)) * conversion(y, x, -towards(x, y))
+        })
     }
 
     fn push(&mut self) -> usize {
@@ -244,23 +248,6 @@ impl Subpath {
     }
 }
 
-/// The factor from a density per steradian at `from` to one per area or volume at `to`, which lies in direction `w`:
-/// D(to)/|x−y|² (Jakob 2013, eq. 3.14). A ray from infinity has a density per area across it; towards infinity, densities
-/// stay per steradian.
-pub fn conversion(from: &Vertex, to: &Vertex, w: Vec3) -> f64 {
-    if to.is_infinite() {
-        return 1.0;
-    }
-    let cosine = f64::from(to.cosine(w));
-    if from.is_infinite() {
-        return cosine;
-    }
-    let d2 = (to.position() - from.position())
-        .as_dvec3()
-        .length_squared();
-    if d2 > 0.0 { cosine / d2 } else { 0.0 }
-}
-
 /// Densities per steradian of a turn along the walk and against it.
 ///
 /// A delta lobe is a distribution in projected solid angle with the refracted side's compressed by η²: relative to the
@@ -275,4 +262,15 @@ fn turn(v: &Vertex, s: &ScatterSample) -> (f64, f64) {
     let cosine = |w: [f32; 3]| f64::from(n.dot(Vec3::from(w)).abs()).max(1e-12);
     let eta = f64::from(s.eta);
     (forward / cosine(s.wi), reverse / (cosine(v.wo) * eta * eta))
+}
+
+/// Unit direction from one vertex to the next; towards a vertex at infinity, or away from it.
+pub(super) fn towards(from: &Vertex, to: &Vertex) -> Vec3 {
+    if from.is_infinite() {
+        -from.position()
+    } else if to.is_infinite() {
+        to.position()
+    } else {
+        (to.position() - from.position()).normalize_or_zero()
+    }
 }

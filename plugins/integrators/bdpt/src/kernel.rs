@@ -5,9 +5,9 @@ use resolvent_api::integrator::Outcome;
 use resolvent_api::rng::Stream;
 use resolvent_api::{Output, SceneView, VertexKind};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
-use resolvent_pathspace::features;
 use resolvent_pathspace::mis::Heuristic;
 use resolvent_pathspace::sampler::Purpose;
+use resolvent_pathspace::samples;
 
 /// What paths are made with.
 pub struct Kernel<'a> {
@@ -35,19 +35,11 @@ impl Kernel<'_> {
             Heuristic::Alone
         };
         let mut paths = Bidirectional::new(walks, heuristic);
-        for y in tile.min[1]..tile.max[1] {
-            for x in tile.min[0]..tile.max[0] {
-                let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
-                for i in tile.sample_begin..tile.sample_end {
-                    let mut draws = NetDraws::new(tile.seed, pixel, i, self.scene.lanes());
-                    let wants = tile.features != 0;
-                    let sample =
-                        self.sample::<CHROMATIC>(&mut paths, [x, y], &mut draws, wants, out)?;
-                    out.add(x, y, &sample)?;
-                }
-            }
-        }
-        Ok(())
+        samples::each(tile, out, |out, p| {
+            let mut draws = NetDraws::new(tile.seed, p.index, p.sample, self.scene.lanes());
+            let wanted = tile.features != 0;
+            self.sample::<CHROMATIC>(&mut paths, p.pixel, &mut draws, wanted, out)
+        })
     }
 
     fn sample<const CHROMATIC: bool>(
@@ -55,23 +47,13 @@ impl Kernel<'_> {
         paths: &mut Bidirectional,
         pixel: [u32; 2],
         draws: &mut NetDraws,
-        wants_features: bool,
+        wanted: bool,
         out: &mut Output<'_>,
     ) -> Outcome<PixelSample> {
         let scene = self.scene;
-        let mut sample = PixelSample::default();
         // A path of k scattering events has k + 2 vertices.
         let limit = (self.max_depth as usize).saturating_add(2);
-        let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
-        if let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? {
-            paths
-                .sensor
-                .from_sensor::<CHROMATIC, _>(scene, &ray, draws, limit)?;
-            let (met, edge) = paths.sensor.first();
-            features::fill(&mut sample, met, edge, scene.lanes(), wants_features);
-        } else {
-            paths.sensor.clear();
-        }
+        let mut sample = paths.look::<CHROMATIC, _>(scene, pixel, draws, limit, wanted)?;
         if self.connects() {
             // The light's own vertex, and at least one that scatters.
             let limit = limit.saturating_sub(1);

@@ -12,13 +12,12 @@
 //! { "integrator": { "plugin": "light" } }
 //! ```
 
-use resolvent_api::abi::{ParamDecl, PixelSample, Tile, scene_traits};
+use resolvent_api::abi::{ParamDecl, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
-use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
-use resolvent_pathspace::features;
+use resolvent_pathspace::bidirectional::{Bidirectional, NetDraws};
 use resolvent_pathspace::mis::Heuristic;
-use resolvent_pathspace::sampler::Purpose;
+use resolvent_pathspace::samples;
 
 /// The integrator.
 struct ParticleTracer {
@@ -63,58 +62,27 @@ impl ParticleTracer {
         let emits = scene.has(scene_traits::LIGHTS) || scene.has(scene_traits::HITTABLE_LIGHTS);
         // The light's own vertex, and one for each scattering.
         let limit = (self.max_depth as usize).saturating_add(1);
-        for y in tile.min[1]..tile.max[1] {
-            for x in tile.min[0]..tile.max[0] {
-                let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
-                for i in tile.sample_begin..tile.sample_end {
-                    let mut draws = NetDraws::new(tile.seed, pixel, i, scene.lanes());
-                    if emits {
-                        paths
-                            .light
-                            .from_light::<CHROMATIC, _>(scene, &mut draws, limit)?;
-                    }
-                    for s in 1..=paths.light.len() {
-                        if let Some(splat) = paths.project(scene, s, &mut draws)? {
-                            out.splat(splat.film, splat.radiance)?;
-                        }
-                    }
-                    let sample = self.seen::<CHROMATIC>(
-                        scene,
-                        &mut paths,
-                        [x, y],
-                        &mut draws,
-                        tile.features != 0,
-                    )?;
-                    out.add(x, y, &sample)?;
+        samples::each(tile, out, |out, p| {
+            let mut draws = NetDraws::new(tile.seed, p.index, p.sample, scene.lanes());
+            if emits {
+                paths
+                    .light
+                    .from_light::<CHROMATIC, _>(scene, &mut draws, limit)?;
+            }
+            for s in 1..=paths.light.len() {
+                if let Some(splat) = paths.project(scene, s, &mut draws)? {
+                    out.splat(splat.film, splat.radiance)?;
                 }
             }
-        }
-        Ok(())
-    }
-
-    /// What the camera's ray meets: lights at infinity, if it does not scatter before, and the features of the picture.
-    fn seen<const CHROMATIC: bool>(
-        &self,
-        scene: &SceneView<'_>,
-        paths: &mut Bidirectional,
-        pixel: [u32; 2],
-        draws: &mut NetDraws,
-        wants_features: bool,
-    ) -> Outcome<PixelSample> {
-        let mut sample = PixelSample::default();
-        let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
-        let Some(ray) = scene.camera_ray(pixel, [a, b], [c, d])? else {
-            return Ok(sample);
-        };
-        paths
-            .sensor
-            .from_sensor::<CHROMATIC, _>(scene, &ray, draws, 2)?;
-        let (met, edge) = paths.sensor.first();
-        features::fill(&mut sample, met, edge, scene.lanes(), wants_features);
-        if met.is_some_and(|v| v.is_infinite()) {
-            sample.radiance = paths.hit(scene, 2)?;
-        }
-        Ok(sample)
+            // The camera's ray finds lights at infinity, if it does not scatter before.
+            let wanted = tile.features != 0;
+            let mut sample = paths.look::<CHROMATIC, _>(scene, p.pixel, &mut draws, 2, wanted)?;
+            let behind = paths.sensor.nodes().get(1);
+            if behind.is_some_and(|n| n.vertex.is_infinite()) {
+                sample.radiance = paths.hit(scene, 2)?;
+            }
+            Ok(sample)
+        })
     }
 }
 

@@ -1,14 +1,14 @@
 //! One chain.
 
-use resolvent_api::abi::{PixelSample, Tile, scene_traits};
+use resolvent_api::abi::{Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::rng::{Stream, derive, mix};
 use resolvent_api::{Output, SceneView, Spectrum};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
 use resolvent_pathspace::chain::Chain;
-use resolvent_pathspace::features;
 use resolvent_pathspace::mis::Heuristic;
 use resolvent_pathspace::sampler::Purpose;
+use resolvent_pathspace::samples;
 
 /// Parameters.
 #[derive(Clone, Copy, Debug)]
@@ -221,30 +221,17 @@ impl<'a> Kernel<'a> {
     /// The samples of the piece's own pixels: light that was not scattered, which chains are bad at (it is bright and found at
     /// once), and the features of the picture.
     fn cover<const CHROMATIC: bool>(&mut self, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
-        let scene = self.scene;
-        for y in tile.min[1]..tile.max[1] {
-            for x in tile.min[0]..tile.max[0] {
-                let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
-                for i in tile.sample_begin..tile.sample_end {
-                    let mut draws = NetDraws::new(tile.seed, pixel, i, scene.lanes());
-                    let mut sample = PixelSample::default();
-                    let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
-                    if let Some(ray) = scene.camera_ray([x, y], [a, b], [c, d])? {
-                        let walk = &mut self.paths.sensor;
-                        walk.from_sensor::<CHROMATIC, _>(scene, &ray, &mut draws, 2)?;
-                        let (met, edge) = walk.first();
-                        let wanted = tile.features != 0;
-                        features::fill(&mut sample, met, edge, scene.lanes(), wanted);
-                        sample.radiance = walk.emitted;
-                        if met.is_some() {
-                            sample.radiance += self.paths.hit(scene, 2)?;
-                        }
-                    }
-                    out.add(x, y, &sample)?;
-                }
+        let (scene, paths) = (self.scene, &mut self.paths);
+        samples::each(tile, out, |_, p| {
+            let mut draws = NetDraws::new(tile.seed, p.index, p.sample, scene.lanes());
+            let wanted = tile.features != 0;
+            let mut sample = paths.look::<CHROMATIC, _>(scene, p.pixel, &mut draws, 2, wanted)?;
+            sample.radiance = paths.sensor.emitted;
+            if paths.sensor.len() > 1 {
+                sample.radiance += paths.hit(scene, 2)?;
             }
-        }
-        Ok(())
+            Ok(sample)
+        })
     }
 }
 

@@ -17,10 +17,11 @@
 mod kernel;
 
 use kernel::Kernel;
-use resolvent_api::abi::{ParamDecl, PixelSample, Tile, scene_traits};
+use resolvent_api::abi::{ParamDecl, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
 use resolvent_pathspace::sampler::Sampler;
+use resolvent_pathspace::samples::{self, Place};
 
 /// The integrator.
 struct PathTracer {
@@ -82,39 +83,21 @@ impl Integrator for PathTracer {
             branching: self.branching,
         };
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
+        let wanted = tile.features != 0;
+        let vacuum = !scene.has(scene_traits::MEDIA);
+        let sampler = |p: Place| {
+            Sampler::new(tile.seed, p.index, p.sample, scene.lanes()).without_flights(vacuum)
+        };
         if scene.is_grey() {
-            each_sample(tile, scene, out, |s, pixel, features| {
-                kernel.path::<false>(s, pixel, features)
+            samples::each(tile, out, |_, p| {
+                kernel.path::<false>(&sampler(p), p.pixel, wanted)
             })
         } else {
-            each_sample(tile, scene, out, |s, pixel, features| {
-                kernel.path::<true>(s, pixel, features)
+            samples::each(tile, out, |_, p| {
+                kernel.path::<true>(&sampler(p), p.pixel, wanted)
             })
         }
     }
-}
-
-/// Runs `path` for every sample of every pixel of a tile, in order.
-fn each_sample(
-    tile: &Tile,
-    scene: &SceneView<'_>,
-    out: &mut Output<'_>,
-    path: impl Fn(&Sampler, [u32; 2], bool) -> Outcome<PixelSample>,
-) -> Outcome<()> {
-    let features = tile.features != 0;
-    let vacuum = !scene.has(scene_traits::MEDIA);
-    for y in tile.min[1]..tile.max[1] {
-        for x in tile.min[0]..tile.max[0] {
-            let pixel = u64::from(y) * u64::from(tile.resolution[0]) + u64::from(x);
-            for i in tile.sample_begin..tile.sample_end {
-                let sampler =
-                    Sampler::new(tile.seed, pixel, i, scene.lanes()).without_flights(vacuum);
-                let sample = path(&sampler, [x, y], features)?;
-                out.add(x, y, &sample)?;
-            }
-        }
-    }
-    Ok(())
 }
 
 resolvent_api::export_plugin!(integrator, PathTracer);
