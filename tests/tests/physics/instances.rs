@@ -30,23 +30,9 @@ fn turned(angle: f64, stretch: [f64; 3]) -> DMat3 {
     DMat3::from_axis_angle(axis, angle) * DMat3::from_diagonal(DVec3::from(stretch))
 }
 
-/// A unit cube about the origin, wound outwards.
+/// A unit cube about the origin.
 fn cube() -> Value {
-    let positions: Vec<[f64; 3]> = (0..8)
-        .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { -0.5 } else { 0.5 }))
-        .collect();
-    let mut indices = Vec::new();
-    for [a, b, c, d] in [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ] {
-        indices.extend([[a, b, c], [a, c, d]]);
-    }
-    json!({ "type": "mesh", "positions": positions, "indices": indices })
+    scenes::cuboid([-0.5; 3], [0.5; 3])
 }
 
 fn with(mut shape: Value, key: &str, value: Value) -> Value {

@@ -5,28 +5,9 @@ use crate::judge::Table;
 use crate::scenes;
 use serde_json::{Value, json};
 
-/// A box, wound outwards.
-fn cuboid(min: [f64; 3], max: [f64; 3]) -> Value {
-    let positions: Vec<[f64; 3]> = (0..8)
-        .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { min[k] } else { max[k] }))
-        .collect();
-    let mut indices = Vec::new();
-    for [a, b, c, d] in [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ] {
-        indices.extend([[a, b, c], [a, c, d]]);
-    }
-    json!({ "type": "mesh", "positions": positions, "indices": indices })
-}
-
 /// A layer between two heights, wide enough for its sides not to matter.
 fn layer(z0: f64, z1: f64) -> Value {
-    cuboid([-3e3, -3e3, z0], [3e3, 3e3, z1])
+    scenes::cuboid([-3e3, -3e3, z0], [3e3, 3e3, z1])
 }
 
 fn add(scene: &mut Value, mut shape: Value, priority: i32, rest: &[(&str, &str)]) {
@@ -271,7 +252,7 @@ fn cut_outs() {
                 scenes::add(&mut scene, "lights", scenes::dome(1.0));
                 let medium = |s: f64| json!({ "sigma_t": s, "albedo": albedo });
                 scenes::medium(&mut scene, "block", medium(block));
-                let cube = cuboid([-1.0; 3], [1.0; 3]);
+                let cube = scenes::cuboid([-1.0; 3], [1.0; 3]);
                 add(&mut scene, cube, 0, &[("interior", "block")]);
                 scene["materials"]["hole"] = json!({ "plugin": "null" });
                 for (k, (centre, radius, priority, sigma)) in balls.iter().enumerate() {
@@ -370,7 +351,7 @@ fn one_body() {
                     ]);
                 }
                 _ => {
-                    let mut cavity = cuboid([-2.9e3, -2.9e3, -2.0], [2.9e3, 2.9e3, -1.0]);
+                    let mut cavity = scenes::cuboid([-2.9e3, -2.9e3, -2.0], [2.9e3, 2.9e3, -1.0]);
                     for t in cavity["indices"].as_array_mut().into_iter().flatten() {
                         if let Some(t) = t.as_array_mut() {
                             t.swap(1, 2);
@@ -392,7 +373,7 @@ fn one_body() {
         scenes::medium(&mut scene, "fog", json!({ "sigma_t": 0.7, "albedo": 0 }));
         for (low, high) in [(-1.0, 0.0), (-1.7, -0.4), (-0.8, -0.6)] {
             // No larger than needed: distances have the error of the triangles' size.
-            let part = cuboid([-10.0, -10.0, low], [10.0, 10.0, high]);
+            let part = scenes::cuboid([-10.0, -10.0, low], [10.0, 10.0, high]);
             add(&mut scene, part, 0, &[("interior", "fog")]);
         }
         cases.push(Case {

@@ -108,3 +108,22 @@ pub fn hemispheres(lower: bool) -> Value {
         "transform": [{ "rotate_deg": { "axis": [1, 0, 0], "angle": 90 } }]
     })
 }
+
+/// A box, wound outwards.
+pub fn cuboid(min: [f64; 3], max: [f64; 3]) -> Value {
+    let positions: Vec<[f64; 3]> = (0..8)
+        .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 0 { min[k] } else { max[k] }))
+        .collect();
+    let mut indices = Vec::new();
+    for [a, b, c, d] in [
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+    ] {
+        indices.extend([[a, b, c], [a, c, d]]);
+    }
+    json!({ "type": "mesh", "positions": positions, "indices": indices })
+}
