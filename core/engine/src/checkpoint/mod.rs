@@ -194,3 +194,6 @@ pub fn fingerprint(path: &Path) -> Result<String> {
     }
     Ok(format!("{bytes} bytes, CRC-32 {:08x}", hasher.finalize()))
 }
+
+#[cfg(test)]
+mod tests;

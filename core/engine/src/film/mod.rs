@@ -14,7 +14,7 @@ mod tile;
 
 pub use buffer::{Buffer, FeatureSums};
 pub use coverage::Coverage;
-pub use error::{Errors, Interval};
+pub use error::{Errors, Interval, student};
 pub use splat::Splats;
 pub use tile::{Rect, TILE};
 

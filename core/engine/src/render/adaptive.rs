@@ -256,3 +256,132 @@ pub fn run(job: &Job, goal: f64) -> bool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::checkpoint::{Checkpoint, State};
+    use crate::film::Buffer;
+    use crate::filter::Filter;
+    use resolvent_api::Spectrum;
+    use resolvent_api::abi::PixelSample;
+    use resolvent_api::rng::{Stream, mix};
+    use serde_json::json;
+
+    /// Two tiles.
+    const WINDOW: [u32; 4] = [0, 0, 18, 2];
+    const BOX: Filter = Filter::Box(0.5);
+
+    /// Rare bright light on the first tile, calm light on the second.
+    fn buffer(seed: u64, rect: Rect, samples: Range<u32>) -> Buffer {
+        let mut b = Buffer::new(rect.min, rect.max, samples.clone(), false);
+        for y in rect.min[1]..rect.max[1] {
+            for x in rect.min[0]..rect.max[0] {
+                let place = u64::from(x) << 40 | u64::from(y) << 32 | u64::from(samples.start);
+                let mut s = Stream::new(mix(mix(seed).wrapping_add(place)));
+                for _ in samples.clone() {
+                    let rare = rect.min[0] == 0 && s.uniform() < 0.01;
+                    let v = if rare { 60.0 } else { s.uniform() };
+                    let sample = PixelSample {
+                        radiance: Spectrum::splat(v),
+                        ..PixelSample::default()
+                    };
+                    b.add(x, y, &sample).unwrap();
+                }
+            }
+        }
+        b
+    }
+
+    /// Mean of the first tile, which is 0.99·0.5 + 0.01·60.
+    const MEAN: f64 = 1.095;
+
+    fn tile_mean(film: &Film) -> f64 {
+        let first = film.tiles().next().unwrap();
+        let all = first.indices(WINDOW).map(|i| film.estimate(i).mean[0]);
+        all.sum::<f64>() / first.pixels() as f64
+    }
+
+    /// Renders rounds until no tile is left, through checkpoints if asked.
+    fn adaptive(seed: u64, goal: f64, stops: bool) -> (Film, Adaptive) {
+        let mut film = Film::in_halves(WINDOW, false);
+        let mut a = Adaptive::new(goal, film.tiles().len());
+        loop {
+            let mut pieces = a.pieces(&mut film);
+            pieces.reverse();
+            for (rect, tile, samples, into) in pieces {
+                let b = buffer(seed, rect, samples);
+                match into {
+                    Into::Film { second } => film.half(second).merge(b, &BOX).unwrap(),
+                    Into::Probe { second } => a.probe(tile, second).merge(b, &BOX).unwrap(),
+                }
+                if stops {
+                    let state = State {
+                        adaptive: Some(a),
+                        ..State::new(film)
+                    };
+                    let bytes = state.to_bytes(&json!(1), &json!(2));
+                    let read = Checkpoint::from_bytes(&bytes).unwrap().state;
+                    (film, a) = (read.film, read.adaptive.unwrap());
+                }
+            }
+            if a.decide(&mut film).0 {
+                return (film, a);
+            }
+        }
+    }
+
+    /// Samples until the pixels' own variances meet the goal: what must not be done.
+    fn naive(seed: u64, goal: f64) -> f64 {
+        let mut film = Film::new(WINDOW, false);
+        for net in 0.. {
+            for rect in film.tiles().take(1) {
+                film.merge(buffer(seed, rect, nets::nth(net)), &BOX).unwrap();
+            }
+            let error = film.half_error(0, 0.0).map(f64::sqrt);
+            if net >= 3 && error.is_some_and(|e| e <= goal) {
+                return tile_mean(&film);
+            }
+        }
+        f64::NAN
+    }
+
+    fn z(values: impl Iterator<Item = f64>) -> (f64, f64) {
+        let all: Vec<f64> = values.collect();
+        let n = all.len() as f64;
+        let mean = all.iter().sum::<f64>() / n;
+        let variance = all.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        (mean, (mean - MEAN) / (variance / n).sqrt())
+    }
+
+    /// A mean over many renders is the truth, where stopping by the samples themselves is far from it.
+    #[test]
+    fn the_mean_is_not_biased() {
+        let (n, goal) = (600, 0.35);
+        let (mean, ours) = z((0..n).map(|s| tile_mean(&adaptive(s, goal, false).0)));
+        assert!(ours.abs() < 3.5, "{mean}, z = {ours}");
+        let (mean, theirs) = z((0..n).map(|s| naive(s, goal)));
+        assert!(theirs < -6.0, "the test has no power: {mean}, z = {theirs}");
+    }
+
+    /// Every tile meets the goal by both halves' estimates, calm ones with the least samples; going through checkpoints after every piece
+    /// changes nothing.
+    #[test]
+    fn tiles_get_what_they_need() {
+        let mut most = 0;
+        for seed in 0..8 {
+            let (film, a) = adaptive(seed, 0.15, false);
+            assert!(a.met.iter().all(|m| *m == [true; 2]) && a.probes.is_empty());
+            let samples = [0, 17].map(|i| film.estimate(i).samples);
+            assert_eq!(samples[1], 64);
+            most = most.max(samples[0]);
+            let errors = film.errors().unwrap();
+            assert!(errors.worst_tile < 0.15 * 1.15, "{errors:?}");
+            let (again, _) = adaptive(seed, 0.15, true);
+            for i in 0..36 {
+                assert_eq!(film.estimate(i), again.estimate(i));
+            }
+        }
+        assert!(most > 500, "{most}");
+    }
+}
