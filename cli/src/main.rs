@@ -4,6 +4,7 @@
 //! usage, input or plugin, 3 interrupted with the finished part saved.
 
 mod args;
+mod checkpoint;
 mod compare;
 mod console;
 mod failure;
@@ -11,6 +12,7 @@ mod guess;
 mod info;
 mod input;
 mod interrupt;
+mod merge;
 mod output;
 mod overrides;
 mod plugin;
@@ -41,6 +43,7 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
+        args::Command::Merge(a) => merge::run(&a),
         args::Command::Plugin(a) => plugin::run(&a),
         args::Command::Schema(a) => plugin::schema(&a),
     });

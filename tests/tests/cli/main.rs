@@ -1,5 +1,6 @@
 //! The program as a user runs it: every test starts the real binary.
 
+mod checkpoint;
 mod determinism;
 mod errors;
 mod hostile;
