@@ -1,0 +1,9 @@
+"""All converters: importing this module registers them."""
+
+from __future__ import annotations
+
+from .context import Context
+
+
+def finish(ctx: Context) -> None:
+    """What is made of the stage as a whole, after the walk."""
