@@ -28,13 +28,15 @@ _NEUTRAL_SCHEMAS = {
 class Claim:
     """One prim under conversion, with its place."""
 
-    def __init__(self, ctx: Context, prim: Usd.Prim, matrix: Matrix, group: Group) -> None:
+    def __init__(self, ctx: Context, prim: Usd.Prim, matrix: Matrix, group: Group, purpose: str = "default") -> None:
         self.ctx = ctx
         self.prim = prim
         self.matrix = matrix
         """Prim to the space of ``group``; for converters that are called once per instance, to the world."""
         self.group = group
         """Where shapes go: the world or a prototype."""
+        self.purpose = purpose
+        """The prim's purpose, inherited or its own."""
         self.pruned = False
         self._taken: set[str] = set()
         self._schemas: set[str] = set()
@@ -63,10 +65,22 @@ class Claim:
             raise InputError(f"{self.path}.{name}", "has numbers that are not finite (NaN or infinity)")
         return value
 
-    def array(self, name: str, dtype: type = float) -> NDArray[Any] | None:
-        """Value of an array attribute, or None if it has none."""
+    def array(self, name: str, dtype: type = float, width: int | None = None) -> NDArray[Any] | None:
+        """Value of an array attribute, or None if it has none; its elements have ``width`` components (None: are numbers)."""
         value = self.get(name)
-        return None if value is None else np.asarray(value, dtype=dtype)
+        if value is None:
+            return None
+        try:
+            array: NDArray[Any] = np.asarray(value, dtype=dtype)
+        except (TypeError, ValueError):
+            array = np.empty((0, 0, 0))
+        if array.ndim == 1 and len(array) == 0 and width is not None:
+            array = array.reshape(0, width)
+        if array.ndim != (1 if width is None else 2) or (width is not None and array.shape[1] != width):
+            found = type(value).__name__
+            wanted = "numbers" if width is None else f"elements of {width} numbers"
+            raise InputError(f"{self.path}.{name}", f"is of type {found} where a list of {wanted} is expected")
+        return array
 
     def authored(self, name: str) -> bool:
         """True if the stage says something about an attribute."""
@@ -119,6 +133,10 @@ class Claim:
             if name in self._taken or name in _HEEDED or name.startswith(_HEEDED_PREFIXES):
                 continue
             if (self.path, name) in self.ctx.used or not _says_something(self.prim, name):
+                continue
+            if name.startswith("primvars:"):
+                # Data for whoever reads it.
+                self.ctx.report.note(self.path, f"{name}: nothing that is converted reads it")
                 continue
             self.ctx.report.skipped(
                 self.path, name, f"{self.prim.GetTypeName() or 'untyped prim'}: unknown to the converter", "no effect"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pxr import Ar, Sdf, Usd, UsdGeom
 
@@ -11,6 +12,9 @@ from .claim import Claim
 from .groups import Group
 from .report import InputError, Report
 from .scene import Files, Json, Matrix, Scene
+
+if TYPE_CHECKING:
+    from .traverse import Walk
 
 
 @dataclass(frozen=True)
@@ -59,10 +63,12 @@ class Context:
         self.used: set[tuple[str, str]] = set()
         """(prim path, property) used by another prim than its own: inherited primvars, bound materials, fields."""
         self.claims: list[Claim] = []
+        self.walk: Walk
+        """The walk under way: converters go down into prototypes with it."""
 
-    def claim(self, prim: Usd.Prim, matrix: Matrix, group: Group) -> Claim:
+    def claim(self, prim: Usd.Prim, matrix: Matrix, group: Group, purpose: str = "default") -> Claim:
         """Takes a prim on; what its converter does not use is reported at the end."""
-        claim = Claim(self, prim, matrix, group)
+        claim = Claim(self, prim, matrix, group, purpose)
         self.claims.append(claim)
         return claim
 

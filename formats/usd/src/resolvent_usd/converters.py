@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from . import geometry  # noqa: F401
 from .context import Context
 
 

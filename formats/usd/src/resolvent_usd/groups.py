@@ -102,4 +102,18 @@ def _in_place(shape: Json, matrix: Matrix) -> Json | None:
     """The shape with its transform; None for a shape without the key that a matrix moves."""
     if np.array_equal(matrix, np.eye(4)):
         return shape
-    return {**shape, "transform": rows(matrix)} if shape["type"] in PLACED else None
+    if shape["type"] in PLACED:
+        return {**shape, "transform": rows(matrix)}
+    scale = similarity(matrix) if shape["type"] == "sphere" else None
+    if scale is None:
+        return None
+    centre = matrix[:3, :3] @ np.asarray(shape["center"]) + matrix[:3, 3]
+    return {**shape, "center": [float(x) for x in centre], "radius": shape["radius"] * scale}
+
+
+def similarity(matrix: Matrix) -> float | None:
+    """The factor on all lengths, if the matrix has one."""
+    linear = matrix[:3, :3]
+    scale = float(np.cbrt(abs(np.linalg.det(linear))))
+    square = linear.T @ linear
+    return scale if np.abs(square - scale**2 * np.eye(3)).max() <= 1e-9 * scale**2 else None

@@ -63,7 +63,7 @@ class Report:
         self.add(error.path, "", "failed", error.message, "missing in the scene")
 
     def note(self, path: object, text: str) -> None:
-        """Something left out because the stage or the command line says so."""
+        """Something left out because the stage or the command line says so, or because nothing asks for it."""
         self.notes.append({"path": str(path), "note": text})
 
     def to_json(self) -> dict[str, Any]:
@@ -84,4 +84,4 @@ class Report:
         if len(ranked) > limit:
             yield f"… and {len(ranked) - limit} more sorts of losses (--report FILE.json lists all)"
         if self.notes:
-            yield f"{len(self.notes)} prims left out as the stage or the command line asks (--report FILE.json lists them)"
+            yield f"{len(self.notes)} notes on what was left out with reason (--report FILE.json lists them)"

@@ -35,6 +35,8 @@ class Walk:
     def __init__(self, ctx: Context) -> None:
         self.ctx = ctx
         self._prototypes: dict[object, Group] = {}
+        self._open: set[str] = set()
+        ctx.walk = self
 
     def stage(self) -> None:
         """Walks the whole stage and reports what was not used."""
@@ -116,7 +118,7 @@ class Walk:
             claim.take_prefix("material:binding")
             claim.take_schema("MaterialBindingAPI", "CollectionAPI", "GeomModelAPI")
             return True
-        claim = self.ctx.claim(prim, place.matrix, place.group)
+        claim = self.ctx.claim(prim, place.matrix, place.group, place.purpose)
         if converter.per_instance and place.group is not self.ctx.world:
             place.group.defer(self._later(converter, prim), place.matrix)
             return True
@@ -145,6 +147,23 @@ class Walk:
             if self.convert(prim, inner):
                 self.below(prim, inner)
         place.group.copies.append(Copies(group, place.matrix[None]))
+
+    def prototype(self, prim: Usd.Prim, purpose: str) -> Group:
+        """The group of a point instancer's prototype, with the prototype's own transform; shared by all that name it."""
+        path = str(prim.GetPath())
+        if path in self._open:
+            raise InputError(path, "is a prototype of an instancer that it contains: this would never end")
+        key = (path, purpose)
+        group = self._prototypes.get(key)
+        if group is None:
+            group = Group(path)
+            self._prototypes[key] = group
+            self._open.add(path)
+            try:
+                self.prim(prim, Place(group, np.eye(4), purpose))
+            finally:
+                self._open.discard(path)
+        return group
 
     def _inherited(self, prim: Usd.Prim) -> object:
         """What an instance inherits that changes the look of its prims: bindings and primvars of the prims above, and its own."""

@@ -21,16 +21,15 @@ def local_matrix(ctx: Context, prim: Usd.Prim) -> tuple[Matrix, bool]:
     """A prim's transform to its parent's space, and whether it resets the stack (is relative to the world)."""
     value, resets = ctx.xforms.GetLocalTransformation(prim)
     matrix = matrix_of(value)
-    check(prim, matrix)
-    return matrix, bool(resets)
-
-
-def check(prim: Usd.Prim, matrix: Matrix) -> None:
-    """Refuses what is no affine transform."""
     if not np.isfinite(matrix).all():
         raise InputError(prim.GetPath(), "its transform has numbers that are not finite (NaN or infinity)")
     if not np.array_equal(matrix[3], [0, 0, 0, 1]):
-        raise InputError(prim.GetPath(), f"its transform is no affine one: the last column is {matrix[3].tolist()}")
+        ctx.report.approximated(
+            prim.GetPath(), "xformOpOrder", f"its matrix is no affine one: the last column is {matrix[3].tolist()}",
+            "(0, 0, 0, 1) is used there",
+        )  # fmt: skip
+        matrix[3] = [0, 0, 0, 1]
+    return matrix, bool(resets)
 
 
 def singular(matrix: Matrix) -> bool:
