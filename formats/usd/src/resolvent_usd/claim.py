@@ -40,10 +40,15 @@ class Claim:
         self.pruned = False
         self._taken: set[str] = set()
         self._schemas: set[str] = set()
+        self._released = False
 
     @property
     def path(self) -> str:
         return str(self.prim.GetPath())
+
+    def release(self) -> None:
+        """Nothing is to be reported of this claim: another one speaks for the prim, or the prim is not asked for."""
+        self._released = True
 
     def prune(self) -> None:
         """The converter has seen to the prim's children, too."""
@@ -123,6 +128,8 @@ class Claim:
 
     def finish(self) -> None:
         """Reports what is authored and was not used."""
+        if self._released:
+            return
         for schema in self.prim.GetAppliedSchemas():
             kind = schema.partition(":")[0]
             if kind not in self._schemas and kind not in _NEUTRAL_SCHEMAS:

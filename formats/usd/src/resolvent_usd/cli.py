@@ -60,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument(
         "--variant", type=_variant, action="append", default=[], metavar="/PRIM{SET=SEL}", help="selects a variant; may be repeated"
     )
-    p.add_argument("--purpose", default="default,render", metavar="LIST", help="purposes that are drawn (default,render)")
+    p.add_argument("--purpose", metavar="LIST", help="purposes that are drawn (the render settings', else default,render)")
     p.add_argument("--camera", type=_prim_path, metavar="/PRIM", help="the camera (that of the render settings, else the first)")
     p.add_argument("--render-settings", type=_prim_path, metavar="/PRIM", help="the RenderSettings prim (the stage's own)")
     p.add_argument("--subdivision", type=int, default=2, metavar="N", choices=range(7), help="level of subdivision surfaces (2)")
@@ -88,7 +88,9 @@ def scene_files(output: Path, frames: Sequence[float | None]) -> list[Path]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Converts as the flags say."""
-    purposes = tuple(word.strip() for word in arguments.purpose.split(",") if word.strip())
+    purposes = None
+    if arguments.purpose is not None:
+        purposes = tuple(word.strip() for word in arguments.purpose.split(",") if word.strip())
     frames: list[float | None] = list(arguments.frames or [arguments.frame])
     outputs = scene_files(arguments.output, frames if arguments.frames else [None])
     report = Report()

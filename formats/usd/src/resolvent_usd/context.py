@@ -14,6 +14,7 @@ from .report import InputError, Report
 from .scene import Files, Json, Matrix, Scene
 
 if TYPE_CHECKING:
+    from .render_settings import RenderSettings
     from .traverse import Walk
 
 
@@ -23,7 +24,8 @@ class Options:
 
     frame: float | None = None
     """Time code; None is the first one of the stage."""
-    purposes: tuple[str, ...] = ("default", "render")
+    purposes: tuple[str, ...] | None = None
+    """Purposes that are drawn; None is what the render settings say, else default and render."""
     variants: tuple[tuple[str, str, str], ...] = ()
     """Prim path, variant set, selection."""
     camera: str | None = None
@@ -63,6 +65,10 @@ class Context:
         self.used: set[tuple[str, str]] = set()
         """(prim path, property) used by another prim than its own: inherited primvars, bound materials, fields."""
         self.claims: list[Claim] = []
+        self.cameras: list[tuple[str, Matrix]] = []
+        """Prim paths and matrices to the world of the cameras that the walk met."""
+        self.settings: RenderSettings
+        self.purposes: tuple[str, ...] = options.purposes or ("default", "render")
         self.walk: Walk
         """The walk under way: converters go down into prototypes with it."""
 

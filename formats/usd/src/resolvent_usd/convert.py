@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pxr import Sdf, Tf, Usd
 
-from . import converters as _converters  # noqa: F401  registers all converters
+from . import converters, render_settings
 from .context import Context, Options
 from .groups import lay_out
 from .report import InputError, Report
@@ -49,8 +49,10 @@ def _select(stage: Usd.Stage, prim_path: str, name: str, selection: str) -> None
 def convert(stage: Usd.Stage, scene_file: Path, options: Options, report: Report) -> Context:
     """Converts a stage at one time and writes the scene; the report grows by what is lost."""
     ctx = Context(stage, options, scene_file, report)
+    ctx.settings = render_settings.read(ctx)
+    ctx.purposes = options.purposes or ctx.settings.purposes or ctx.purposes
     Walk(ctx).stage()
-    _converters.finish(ctx)
+    converters.finish(ctx)
     lay_out(ctx.world, ctx.scene)
     for claim in ctx.claims:
         claim.finish()

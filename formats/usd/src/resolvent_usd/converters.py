@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from . import geometry  # noqa: F401
+from . import cameras, geometry, render_settings  # noqa: F401
 from .context import Context
 
 
 def finish(ctx: Context) -> None:
     """What is made of the stage as a whole, after the walk."""
+    cameras.finish(ctx)

@@ -90,7 +90,7 @@ class Walk:
         attribute = imageable.GetPurposeAttr()
         if attribute.HasAuthoredValue():
             purpose = str(attribute.Get())
-        if purpose not in ctx.options.purposes:
+        if purpose not in ctx.purposes:
             ctx.report.note(prim.GetPath(), f"purpose {purpose}")
             return None
         if not UsdGeom.Xformable(prim):
