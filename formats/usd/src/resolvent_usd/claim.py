@@ -122,9 +122,10 @@ class Claim:
 
     def no_effect(self, name: str, reason: str, consequence: str) -> None:
         """Reports an attribute if its value is authored."""
-        if self.authored(name):
-            self.skipped(name, reason, consequence)
         self._taken.add(name)
+        value = self.prim.GetAttribute(name).Get(self.ctx.time) if self.authored(name) else None
+        if value is not None and not (hasattr(value, "__len__") and len(value) == 0):
+            self.skipped(name, reason, consequence)
 
     def finish(self) -> None:
         """Reports what is authored and was not used."""

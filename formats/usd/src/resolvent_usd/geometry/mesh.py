@@ -22,6 +22,18 @@ from .refine import Surface, refine
 Ints = NDArray[np.int64]
 
 
+@converts("GeomSubset")
+def subset(ctx: Context, claim: Claim) -> None:
+    """Subsets belong to the mesh above; of other shapes they have no effect."""
+    if claim.prim.GetParent().GetTypeName() == "Mesh":
+        claim.release()
+        return
+    claim.take("familyName", "elementType", "indices")
+    claim.take_prefix("material:binding")
+    claim.take_schema("MaterialBindingAPI")
+    claim.skipped("", "only meshes have subsets", "their materials have no effect")
+
+
 @converts("Mesh")
 def mesh(ctx: Context, claim: Claim) -> None:
     """Converts a mesh: one glTF shape for each material."""
