@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import struct
 from collections.abc import Iterator
@@ -17,6 +18,11 @@ from resolvent_usd.context import Options
 from resolvent_usd.convert import convert, open_stage
 from resolvent_usd.report import Report
 
+# A grey pixel.
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010800000000" + "3a7e9b55" + "0000000a49444154789c6368000000820081"
+    + "77cd72b6" + "0000000049454e44ae426082"
+)  # fmt: skip
 DATA = Path(__file__).parent / "data" / "usd"
 
 
@@ -110,11 +116,15 @@ def area_vectors(mesh: dict[str, np.ndarray]) -> np.ndarray:
 
 @pytest.fixture
 def convert_text(tmp_path: Path):
-    """Converts the text of a .usda file."""
+    """Converts the text of a .usda file; beside it is a picture texture.png."""
+    (tmp_path / "texture.png").write_bytes(PIXEL)
+    # USD keeps layers by their paths.
+    numbers = itertools.count()
 
     def run(text: str, **options: Any) -> Converted:
-        source = tmp_path / "stage.usda"
-        source.write_text("#usda 1.0\n" + text)
+        source = tmp_path / f"stage{next(numbers)}.usda"
+        # One statement a line: so that tests can write several.
+        source.write_text("#usda 1.0\n" + text.replace("} ", "}\n").replace("; ", "\n"))
         return convert_file(source, tmp_path / "out.json", **options)
 
     return run

@@ -66,8 +66,8 @@ def _welded(
     points: Array, indices: Ints, corners: Ints, normals: tuple[Array, Ints] | None, uv: tuple[Array, Ints] | None
 ) -> Triangles:
     """Corners that agree in everything become one vertex."""
-    attributes = [a for a in (normals, uv) if a is not None]
-    apart = [(values, which) for values, which in attributes if not _follows(values, which, indices, len(points))]
+    shared = [_shared(*a, indices, len(points)) for a in (normals, uv) if a is not None]
+    apart = [which for which in shared if which is not None]
     if not apart:
         # Everything hangs on the point.
         first = np.zeros(len(points), dtype=np.int64)
@@ -79,8 +79,8 @@ def _welded(
         return Triangles(points, indices[corners], per_point(normals), per_point(uv))
     flat = corners.reshape(-1)
     key = indices[flat]
-    for values, which in apart:
-        key = _dense(key) * len(values) + which[flat]
+    for which in apart:
+        key = _dense(key) * (int(which.max()) + 1) + which[flat]
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     source = flat[first]
 
@@ -97,15 +97,19 @@ def _dense(key: Ints) -> Ints:
     return key
 
 
-def _follows(values: Array, which: Ints, indices: Ints, size: int) -> bool:
-    """True if all corners at a point have the same value."""
+def _shared(values: Array, which: Ints, indices: Ints, size: int) -> Ints | None:
+    """The same values, corners with that of their point's first corner referring to it; None if all have it."""
     if which is indices:
-        return True
+        return None
     first = np.zeros(size, dtype=np.int64)
     first[indices[::-1]] = which[::-1]
     other = first[indices]
     differ = np.flatnonzero(other != which)
-    return bool(np.array_equal(values[other[differ]], values[which[differ]]))
+    own = differ[(values[other[differ]] != values[which[differ]]).any(axis=1)]
+    if len(own) == 0:
+        return None
+    other[own] = which[own]
+    return other
 
 
 def refine(
