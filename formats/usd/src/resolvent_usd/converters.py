@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import cameras, geometry, render_settings  # noqa: F401
+from . import cameras, geometry, lights, render_settings, shading, volumes  # noqa: F401
 from .context import Context
 
 
