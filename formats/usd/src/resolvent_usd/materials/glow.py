@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from pxr import Usd, UsdLux
+from pxr import UsdLux
 
 from ..context import Look
 from ..scene import Json, rgb
@@ -90,14 +90,14 @@ def _area(ctx: Context, claim: Claim, light: Claim) -> float:
     """Area in the world of the mesh's polygons, for ``normalize``."""
     if not UsdLux.LightAPI(light.prim).GetNormalizeAttr().Get(ctx.time):
         return 1.0
-    points = claim.array("points")
+    points = claim.array("points", float, 3)
     counts, indices = claim.array("faceVertexCounts", int), claim.array("faceVertexIndices", int)
     if points is None or counts is None or indices is None or not len(counts):
         light.approximated("inputs:normalize", "the area of this shape is not known", "its emission is not divided by it")
         return 1.0
     if claim.group is not ctx.world:
         light.approximated("inputs:normalize", "the mesh is instanced", "its area without the instance's transform is used")
-    if Usd.Prim(claim.prim).GetAttribute("subdivisionScheme").Get() != "none":
+    if claim.get("subdivisionScheme") != "none":
         light.approximated("inputs:normalize", "the mesh is a subdivision surface", "the area of its cage is used")
     placed = points @ claim.matrix[:3, :3].T
     first = np.cumsum(counts) - counts
