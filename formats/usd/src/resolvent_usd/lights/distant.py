@@ -29,6 +29,9 @@ def distant(ctx: Context, claim: Claim) -> None:
         return
     if angle > 180.0:
         claim.approximated("inputs:angle", f"a disc of {angle:g}° is more than half of all directions", "one of 180° is used")
+    if size != 1.0 and not bool(value(claim, "inputs:normalize", False)) and projected < 1e-2:
+        # What surprises most in these units: intensity is the radiance of a disc that is tiny.
+        ctx.report.note(claim.path, f"not normalized: gives an irradiance of {float(color.max() * projected):.3g} at most")
     to_light = claim.matrix[:3, 2] / np.linalg.norm(claim.matrix[:3, 2])
     ctx.scene.lights.append(
         {"type": "distant", "to_light": rgb(to_light), "irradiance": rgb(color * projected), "angle_deg": min(angle, 180.0)}

@@ -56,7 +56,7 @@ def radiance(claim: Claim, size: float) -> Color:
     if color.min() < 0.0:
         claim.approximated("inputs:intensity", "the light's emission is negative", "such channels are dark")
     _common(claim)
-    return np.maximum(color, 0.0)
+    return np.asarray(np.maximum(color, 0.0))
 
 
 def _common(claim: Claim) -> None:

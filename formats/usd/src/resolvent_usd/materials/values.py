@@ -119,8 +119,10 @@ class Builder:
             index = int(node.value("index", 0)) if kind == "extract" else _OUTPUTS.get(link.output, 0)
             if inner.texture is None:
                 return Value(np.repeat(inner.constant[min(index, 2)], 3))
-            pick = lambda v: None if v is None else np.repeat(v[min(index, 2)], 3)  # noqa: E731
-            return Value(inner.constant, {**inner.texture, "channel": "rgba"[index]}, pick(inner.scale), pick(inner.bias))
+            k = min(index, 2)
+            scale = None if inner.scale is None else np.repeat(inner.scale[k], 3)
+            bias = None if inner.bias is None else np.repeat(inner.bias[k], 3)
+            return Value(inner.constant, {**inner.texture, "channel": "rgba"[index]}, scale, bias)
         return None
 
     def _inner(self, node: Node, name: str, default: Any, depth: int) -> Value | None:

@@ -17,7 +17,7 @@ from ..report import InputError
 from ..scene import Json, Matrix, rgb, rows
 from ..shading import network
 from .fields import Field, read
-from .optics import Optics, Term
+from .optics import Color, Optics, Term
 from .shaders import CONTEXTS, optics_of
 
 ROLES = {
@@ -102,11 +102,11 @@ def _by_names(claim: Claim, fields: dict[str, Field]) -> Optics:
     return out
 
 
-def _display_color(claim: Claim) -> np.ndarray | None:  # type: ignore[type-arg]
+def _display_color(claim: Claim) -> Color | None:
     value = UsdGeom.Gprim(claim.prim).GetDisplayColorAttr().Get(claim.ctx.time)
     if value is None or len(value) == 0:
         return None
-    return np.clip(np.asarray(value, dtype=float).mean(axis=0), 0.0, 1.0)
+    return np.asarray(np.clip(np.asarray(value, dtype=float).mean(axis=0), 0.0, 1.0))
 
 
 def _density_scale(claim: Claim) -> float:
