@@ -124,7 +124,7 @@ def convert_text(tmp_path: Path):
     def run(text: str, **options: Any) -> Converted:
         source = tmp_path / f"stage{next(numbers)}.usda"
         # One statement a line: so that tests can write several.
-        source.write_text("#usda 1.0\n" + text.replace("} ", "}\n").replace("; ", "\n"))
+        source.write_text("#usda 1.0\n" + text.replace("; ", "\n").replace("{ ", "{\n").replace(" }", "\n}\n").replace("} ", "}\n"))
         return convert_file(source, tmp_path / "out.json", **options)
 
     return run

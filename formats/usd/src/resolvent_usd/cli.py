@@ -6,13 +6,14 @@ Exit codes: 0 done, 2 wrong usage or input (with --strict also a loss), 1 anythi
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from pxr import Sdf
+from pxr import Ar, Sdf, Usd
 
 from .context import Options
 from .convert import convert, open_stage
@@ -65,6 +66,7 @@ def parser() -> argparse.ArgumentParser:
     p.add_argument("--render-settings", type=_prim_path, metavar="/PRIM", help="the RenderSettings prim (the stage's own)")
     p.add_argument("--subdivision", type=int, default=2, metavar="N", choices=range(7), help="level of subdivision surfaces (2)")
     p.add_argument("--report", type=Path, metavar="FILE.json", help="writes all losses as JSON")
+    p.add_argument("--layers", type=Path, metavar="FILE.json", help="writes the files of all layers that were read, with hashes of them")
     p.add_argument("--strict", action="store_true", help="any loss is an error")
     p.add_argument("--keep-going", action="store_true", help="leaves out prims with errors and converts the rest")
     return p
@@ -84,6 +86,12 @@ def scene_files(output: Path, frames: Sequence[float | None]) -> list[Path]:
         return re.sub("#+", number, pattern, count=1)
 
     return [output.with_name(name(frame or 0.0)) for frame in frames]
+
+
+def layer_hashes(stage: Usd.Stage) -> dict[str, str]:
+    """BLAKE2b (16 bytes) of the files that the stage is composed of; packages count as a whole."""
+    paths = {Ar.SplitPackageRelativePathOuter(layer.realPath)[0] for layer in stage.GetUsedLayers() if layer.realPath}
+    return {path: hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest() for path in sorted(paths)}
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -111,6 +119,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(output)
     if arguments.report:
         arguments.report.write_text(json.dumps(report.to_json(), indent=1), encoding="utf-8")
+    if arguments.layers and stage:
+        arguments.layers.write_text(json.dumps(layer_hashes(stage), indent=1), encoding="utf-8")
     for line in report.summary():
         print(line, file=sys.stderr)
     if arguments.strict and report.losses:

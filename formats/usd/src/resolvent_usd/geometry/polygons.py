@@ -17,6 +17,16 @@ def triangulate(points: NDArray[Any], counts: Ints, indices: Ints) -> tuple[Ints
     Returns (m, 3) positions in ``indices`` (corners, so that faceVarying data can follow) and the m faces they come from, in
     the order of the faces. Convex polygons become fans, others are cut by ear clipping.
     """
+    if len(counts) and counts.min() == counts.max() <= 4:
+        # What most meshes are, without looking for more.
+        n = int(counts[0])
+        ring = np.arange(len(indices)).reshape(-1, n)
+        if n == 3:
+            return ring, np.arange(len(counts))
+        cut = ring[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 2, 3)
+        folded = _folded(points[indices].reshape(-1, 4, 3))
+        cut[folded] = ring[folded][:, [0, 1, 3, 1, 2, 3]].reshape(-1, 2, 3)
+        return cut.reshape(-1, 3), np.repeat(np.arange(len(counts)), 2)
     starts = np.cumsum(counts) - counts
     corners: list[Ints] = []
     faces: list[Ints] = []
@@ -42,14 +52,18 @@ def triangulate(points: NDArray[Any], counts: Ints, indices: Ints) -> tuple[Ints
 
 def _quads(p: Floats) -> Ints:
     """Cuts (k, 4, 3) quadrilaterals from corner 0 to 2, and those with a reflex corner 1 or 3 from 1 to 3."""
-    d = p[:, 2] - p[:, 0]
-    a = np.cross(p[:, 1] - p[:, 0], d)
-    b = np.cross(d, p[:, 3] - p[:, 0])
-    folded = np.einsum("ij,ij->i", a, b) < 0
     cut = np.empty((len(p), 2, 3), dtype=np.int64)
     cut[:] = [[0, 1, 2], [0, 2, 3]]
-    cut[folded] = [[0, 1, 3], [1, 2, 3]]
+    cut[_folded(p)] = [[0, 1, 3], [1, 2, 3]]
     return cut
+
+
+def _folded(p: NDArray[Any]) -> NDArray[np.bool_]:
+    """True where the triangles of a cut from corner 0 to 2 turn different ways."""
+    (ax, ay, az), (dx, dy, dz), (bx, by, bz) = ((p[:, k] - p[:, 0]).T for k in (1, 2, 3))
+    first = (ay * dz - az * dy, az * dx - ax * dz, ax * dy - ay * dx)
+    second = (dy * bz - dz * by, dz * bx - dx * bz, dx * by - dy * bx)
+    return np.asarray(sum(u * v for u, v in zip(first, second, strict=True)) < 0)
 
 
 def _polygons(p: Floats) -> Ints:
