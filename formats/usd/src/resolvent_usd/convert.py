@@ -27,7 +27,7 @@ def open_stage(path: str, options: Options, report: Report) -> Usd.Stage:
     for prim_path, name, selection in options.variants:
         _select(stage, prim_path, name, selection)
     for broken in stage.GetCompositionErrors():
-        problem = InputError(broken.rootSite.path, str(broken).strip())
+        problem = InputError(broken.rootSite.path, " ".join(str(broken).split()))
         if not options.keep_going:
             raise problem
         report.failed(problem)
