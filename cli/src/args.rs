@@ -37,6 +37,9 @@ pub enum Command {
     Info(Info),
     /// Compare an image with a reference
     Compare(Compare),
+    /// Measure time against error on the benchmark scenes
+    #[cfg(feature = "bench")]
+    Bench(Box<resolvent_bench::Options>),
     /// List plugins, or describe one
     Plugin(Plugin),
     /// Print the JSON Schema of scene files, with the parameters of all plugins found

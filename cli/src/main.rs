@@ -4,6 +4,8 @@
 //! usage, input or plugin, 3 interrupted with the finished part saved.
 
 mod args;
+#[cfg(feature = "bench")]
+mod bench;
 mod compare;
 mod console;
 mod failure;
@@ -41,6 +43,8 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
+        #[cfg(feature = "bench")]
+        args::Command::Bench(a) => bench::run(&a),
         args::Command::Plugin(a) => plugin::run(&a),
         args::Command::Schema(a) => plugin::schema(&a),
     });

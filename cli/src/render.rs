@@ -59,7 +59,9 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let features = output::wants_features(&described);
     output::check_memory(described.film.window(), features, described.film.aovs.len())?;
 
+    let cpu = crate::system::cpu_seconds().unwrap_or(0.0);
     let rendered = render(&built, &integrator, &described, &plan);
+    seconds.render_cpu = crate::system::cpu_seconds().unwrap_or(0.0) - cpu;
     interrupt::enter(Phase::Writing);
     let (rendered, broken) = match rendered {
         Ok(rendered) => (rendered, None),
