@@ -10,9 +10,19 @@ const LEAF: i32 = 8;
 const LOWER: i32 = 128;
 const UPPER: i32 = 4096;
 
+/// Voxels round the origin, to be written as a file.
+pub struct Voxels<'a> {
+    /// No coordinate of a voxel that is not 0 is beyond ± this.
+    pub reach: i32,
+    /// Edge of a voxel.
+    pub size: f64,
+    /// The value at a voxel; those that are not 0 are active.
+    pub value: &'a (dyn Fn([i32; 3]) -> f32),
+}
+
 /// A round cloud of about `voxels` active voxels: a ball that thins out towards its rim, with waves in it.
 ///
-/// Values are 0.2 to 1 inside; sums of sines per axis, so that hundreds of millions of them are quick to make.
+/// Values are 0.2 to 1 inside; products of sines per axis, so that hundreds of millions of them are quick to make.
 #[derive(Clone, Debug)]
 pub struct Ball {
     /// Radius in voxels.
@@ -33,11 +43,6 @@ impl Ball {
         }
     }
 
-    /// Edge of a voxel if the ball's radius is 1.
-    pub fn voxel_size(&self) -> f64 {
-        1.0 / self.radius
-    }
-
     fn value(&self, [x, y, z]: [i32; 3]) -> f32 {
         let r2 = f64::from(x).powi(2) + f64::from(y).powi(2) + f64::from(z).powi(2);
         let inside = 1.0 - r2 / (self.radius * self.radius);
@@ -50,23 +55,21 @@ impl Ball {
         waves * (4.0 * inside).min(1.0) as f32
     }
 
-    /// The 512 values of the leaf at an origin; x varies slowest. `None` if all are 0.
-    fn leaf(&self, origin: [i32; 3]) -> Option<[f32; 512]> {
-        // The nearest and farthest a voxel of the leaf can be.
-        let near = origin.map(|o| f64::from(o.max(-o - LEAF + 1).max(0)));
-        if near.iter().map(|d| d * d).sum::<f64>() >= self.radius * self.radius {
-            return None;
-        }
-        let mut out = [0.0; 512];
-        for (i, v) in out.iter_mut().enumerate() {
-            let i = i as i32;
-            let at = [i >> 6, i >> 3 & 7, i & 7];
-            *v = self.value([0, 1, 2].map(|k| origin[k] + at[k]));
-        }
-        out.iter().any(|v| *v > 0.0).then_some(out)
-    }
-
     /// Writes the ball, of radius 1 round the origin, as the float grid `density`. Returns the number of active voxels.
+    pub fn write(&self, path: &Path) -> Result<u64> {
+        let voxels = Voxels {
+            reach: self.radius.ceil() as i32,
+            size: 1.0 / self.radius,
+            value: &|at| self.value(at),
+        };
+        voxels.write(path)
+    }
+}
+
+type Leaf = [f32; 512];
+
+impl Voxels<'_> {
+    /// Writes the float grid `density`. Returns the number of active voxels.
     pub fn write(&self, path: &Path) -> Result<u64> {
         let file = std::fs::File::create(path).map_err(Error::io(path))?;
         let mut out = BufWriter::with_capacity(1 << 20, file);
@@ -75,54 +78,74 @@ impl Ball {
         Ok(count)
     }
 
+    /// The values of the leaf at an origin; x varies slowest. `None` if all are 0.
+    fn leaf(&self, origin: [i32; 3]) -> Option<Leaf> {
+        let mut out = [0.0; 512];
+        for (i, v) in out.iter_mut().enumerate() {
+            let i = i as i32;
+            let at = [i >> 6, i >> 3 & 7, i & 7];
+            *v = (self.value)([0, 1, 2].map(|k| origin[k] + at[k]));
+        }
+        out.iter().any(|v| *v != 0.0).then_some(out)
+    }
+
+    /// Origins of nodes of an edge that the voxels may reach, within a larger node; by x, y, z.
+    fn nodes(&self, edge: i32, within: Option<([i32; 3], i32)>) -> Vec<[i32; 3]> {
+        let range = |k: usize| {
+            let r = self.reach;
+            let (low, high) =
+                within.map_or((-r, r), |(o, e)| (o[k].max(-r), (o[k] + e - 1).min(r)));
+            (low.div_euclid(edge)..=high.div_euclid(edge)).map(move |n| n * edge)
+        };
+        let mut all = Vec::new();
+        for x in range(0) {
+            for y in range(1) {
+                all.extend(range(2).map(|z| [x, y, z]));
+            }
+        }
+        all
+    }
+
     fn write_to(&self, out: &mut impl Write) -> std::io::Result<u64> {
-        let r = self.radius.ceil() as i32 + 1;
-        let nodes = |edge: i32, low: i32, high: i32| {
-            (low.div_euclid(edge)..=high.div_euclid(edge)).map(move |k| k * edge)
-        };
-        let cells = |edge: i32, within: Option<([i32; 3], i32)>| -> Vec<[i32; 3]> {
-            let range = |k: usize| {
-                let (low, high) =
-                    within.map_or((-r, r), |(o, e)| (o[k].max(-r), (o[k] + e - 1).min(r)));
-                nodes(edge, low, high).collect::<Vec<_>>()
-            };
-            let (xs, ys, zs) = (range(0), range(1), range(2));
-            let mut all = Vec::new();
-            for x in &xs {
-                for y in &ys {
-                    all.extend(zs.iter().map(|z| [*x, *y, *z]));
-                }
+        let (topology, leaves) = self.topology();
+        let mut head = header();
+        let mut grid = description(self.size);
+        grid.extend(topology);
+        let (mut active, mut length) = (0u64, 0u64);
+        for (_, mask) in &leaves {
+            let count = mask.iter().map(|b| u64::from(b.count_ones())).sum::<u64>();
+            active += count;
+            length += 65 + 4 * count;
+        }
+        let start = head.len() as u64 + 24;
+        let blocks = start + grid.len() as u64;
+        for offset in [start, blocks, blocks + length] {
+            head.extend(offset.to_le_bytes());
+        }
+        out.write_all(&head)?;
+        out.write_all(&grid)?;
+        for (origin, mask) in &leaves {
+            out.write_all(mask)?;
+            out.write_all(&[0])?; // inactive voxels have the background's value
+            let values = self.leaf(*origin).into_iter().flatten();
+            for v in values.filter(|v| *v != 0.0) {
+                out.write_all(&v.to_le_bytes())?;
             }
-            all
-        };
-        let mask_of = |values: &[f32; 512]| {
-            let mut mask = [0u8; 64];
-            for (i, v) in values.iter().enumerate() {
-                mask[i / 8] |= u8::from(*v > 0.0) << (i % 8);
-            }
-            mask
-        };
-        // Masks of children and of active tiles (none), then the code of a node without values.
-        let node = |edge: i32, origin: [i32; 3], step: i32, children: &[[i32; 3]]| {
-            let n = (edge / step) as usize;
-            let mut masks = vec![0u8; 2 * n * n * n / 8];
-            for c in children {
-                let at = [0, 1, 2].map(|k| ((c[k] - origin[k]) / step) as usize);
-                let slot = (at[0] * n + at[1]) * n + at[2];
-                masks[slot / 8] |= 1 << (slot % 8);
-            }
-            masks.push(0);
-            masks
-        };
-        // Leaves in the file's order: upper nodes, in them lower nodes, in them leaves, each by x, y, z.
-        let mut leaves: Vec<[i32; 3]> = Vec::new();
-        let mut topology = Vec::new();
-        let uppers = cells(UPPER, None);
-        for upper in &uppers {
-            topology.extend(upper.iter().flat_map(|c| c.to_le_bytes()));
+        }
+        Ok(active)
+    }
+
+    /// The tree without its values, and origin and mask of every leaf in the file's order: upper nodes, in them lower nodes, in
+    /// them leaves.
+    fn topology(&self) -> (Vec<u8>, Vec<([i32; 3], [u8; 64])>) {
+        let (mut bytes, mut leaves) = (Vec::new(), Vec::new());
+        let uppers = self.nodes(UPPER, None);
+        bytes.extend((uppers.len() as u32).to_le_bytes());
+        for upper in uppers {
             let mut lowers = Vec::new();
-            for lower in cells(LOWER, Some((*upper, UPPER))) {
-                let inside: Vec<_> = cells(LEAF, Some((lower, LOWER)))
+            for lower in self.nodes(LOWER, Some((upper, UPPER))) {
+                let inside: Vec<_> = self
+                    .nodes(LEAF, Some((lower, LOWER)))
                     .into_iter()
                     .filter_map(|o| self.leaf(o).map(|v| (o, mask_of(&v))))
                     .collect();
@@ -130,73 +153,80 @@ impl Ball {
                     lowers.push((lower, inside));
                 }
             }
-            let origins: Vec<_> = lowers.iter().map(|l| l.0).collect();
-            topology.extend(node(UPPER, *upper, LOWER, &origins));
+            bytes.extend(upper.iter().flat_map(|c| c.to_le_bytes()));
+            bytes.extend(node(UPPER, upper, LOWER, lowers.iter().map(|l| l.0)));
             for (lower, inside) in lowers {
-                let origins: Vec<_> = inside.iter().map(|l| l.0).collect();
-                topology.extend(node(LOWER, lower, LEAF, &origins));
-                inside.iter().for_each(|l| topology.extend(l.1));
-                leaves.extend(origins);
+                bytes.extend(node(LOWER, lower, LEAF, inside.iter().map(|l| l.0)));
+                inside.iter().for_each(|l| bytes.extend(l.1));
+                leaves.extend(inside);
             }
         }
-
-        let text = |t: &str| [&(t.len() as u32).to_le_bytes()[..], t.as_bytes()].concat();
-        let mut head = 0x5644_4220_i64.to_le_bytes().to_vec();
-        for word in [224u32, 10, 0] {
-            head.extend(word.to_le_bytes());
-        }
-        head.push(1); // grids know their offsets
-        head.extend([b'0'; 36]);
-        head.extend(0u32.to_le_bytes());
-        head.extend(1i32.to_le_bytes());
-        for part in ["density", "Tree_float_5_4_3", ""] {
-            head.extend(text(part));
-        }
-        let mut grid = 2u32.to_le_bytes().to_vec(); // values of active voxels only
-        grid.extend(1u32.to_le_bytes());
-        for part in ["class", "string", "fog volume"] {
-            grid.extend(text(part));
-        }
-        grid.extend(text("UniformScaleMap"));
-        let size = self.voxel_size();
-        // scale, voxel size, inverse scale, its square, half of the inverse
-        let (inverse, half) = (1.0 / size, 0.5 / size);
-        for v in [size, size, inverse, inverse * inverse, half] {
-            (0..3).for_each(|_| grid.extend(v.to_le_bytes()));
-        }
-        grid.extend(1u32.to_le_bytes()); // buffers
-        grid.extend(0f32.to_le_bytes()); // background
-        grid.extend(0u32.to_le_bytes()); // tiles of the root
-        grid.extend((uppers.len() as u32).to_le_bytes());
-        grid.extend(topology);
-
-        let mut active = 0u64;
-        let mut values_length = 0u64;
-        for o in &leaves {
-            let mask = self.leaf(*o).map_or([0; 64], |v| mask_of(&v));
-            let count: u32 = mask.iter().map(|b| b.count_ones()).sum();
-            active += u64::from(count);
-            values_length += 65 + 4 * u64::from(count);
-        }
-        let start = head.len() as u64 + 24;
-        let blocks = start + grid.len() as u64;
-        for offset in [start, blocks, blocks + values_length] {
-            head.extend(offset.to_le_bytes());
-        }
-        out.write_all(&head)?;
-        out.write_all(&grid)?;
-        for o in &leaves {
-            let Some(values) = self.leaf(*o) else {
-                continue;
-            };
-            out.write_all(&mask_of(&values))?;
-            out.write_all(&[0])?; // inactive voxels have the background's value
-            for v in values.iter().filter(|v| **v > 0.0) {
-                out.write_all(&v.to_le_bytes())?;
-            }
-        }
-        Ok(active)
+        (bytes, leaves)
     }
+}
+
+fn mask_of(values: &Leaf) -> [u8; 64] {
+    let mut mask = [0; 64];
+    for (i, v) in values.iter().enumerate() {
+        mask[i / 8] |= u8::from(*v != 0.0) << (i % 8);
+    }
+    mask
+}
+
+/// A node's masks of children and of active tiles (none), and the code for values (none).
+fn node(
+    edge: i32,
+    origin: [i32; 3],
+    step: i32,
+    children: impl Iterator<Item = [i32; 3]>,
+) -> Vec<u8> {
+    let n = (edge / step) as usize;
+    let mut masks = vec![0u8; 2 * n * n * n / 8];
+    for c in children {
+        let at = [0, 1, 2].map(|k| ((c[k] - origin[k]) / step) as usize);
+        let slot = (at[0] * n + at[1]) * n + at[2];
+        masks[slot / 8] |= 1 << (slot % 8);
+    }
+    masks.push(0);
+    masks
+}
+
+fn text(t: &str) -> Vec<u8> {
+    [&(t.len() as u32).to_le_bytes()[..], t.as_bytes()].concat()
+}
+
+/// Of a file with one grid, up to the grid's offsets.
+fn header() -> Vec<u8> {
+    let mut out = 0x5644_4220_i64.to_le_bytes().to_vec();
+    for word in [224u32, 10, 0] {
+        out.extend(word.to_le_bytes());
+    }
+    out.push(1); // grids know their offsets
+    out.extend([b'0'; 36]);
+    out.extend(0u32.to_le_bytes());
+    out.extend(1i32.to_le_bytes());
+    for part in ["density", "Tree_float_5_4_3", ""] {
+        out.extend(text(part));
+    }
+    out
+}
+
+/// A grid up to the number of its root's children.
+fn description(size: f64) -> Vec<u8> {
+    let mut out = 2u32.to_le_bytes().to_vec(); // values of active voxels only
+    out.extend(1u32.to_le_bytes());
+    for part in ["class", "string", "fog volume"] {
+        out.extend(text(part));
+    }
+    out.extend(text("UniformScaleMap"));
+    // scale, voxel size, inverse scale, its square, half of the inverse
+    for v in [size, size, 1.0 / size, size.powi(-2), 0.5 / size] {
+        (0..3).for_each(|_| out.extend(v.to_le_bytes()));
+    }
+    out.extend(1u32.to_le_bytes()); // buffers
+    out.extend(0f32.to_le_bytes()); // background
+    out.extend(0u32.to_le_bytes()); // tiles of the root
+    out
 }
 
 /// Writes a grid as a dense array for programs that read no OpenVDB: `f32`, x fastest, with one voxel of background round the
@@ -313,7 +343,7 @@ mod tests {
             });
             assert_eq!(count, active);
             let world = grid.transform.as_ref().unwrap().to_world([3.0, 0.0, 0.0]);
-            assert!((world[0] - 3.0 * ball.voxel_size()).abs() < 1e-12);
+            assert!((world[0] - 3.0 / ball.radius).abs() < 1e-12);
 
             write_dense(&path, "density", &folder.join("ball.raw")).unwrap();
             let dense = std::fs::read(folder.join("ball.raw")).unwrap();
