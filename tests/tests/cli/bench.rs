@@ -33,7 +33,10 @@ fn mistakes_are_named() {
     for (args, word) in [
         (&["--scene", "clod_sun"][..], "cloud_sun"),
         (&["--against", "arnold"], "mitsuba"),
-        (&["--against", "mitsuba", "--python", "/nowhere/python"], "/nowhere/python"),
+        (
+            &["--against", "mitsuba", "--python", "/nowhere/python"],
+            "/nowhere/python",
+        ),
         (&["--compare", "other.json"], "other.json"),
         (&["--compare", "none.json"], "none.json"),
         (&["--root", "."], "scenes/bench"),

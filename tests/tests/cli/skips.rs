@@ -155,7 +155,11 @@ fn what_is_absent_costs_nothing() {
         })
     };
     let (one, two) = (stats(&at, &heat(false), &[]), stats(&at, &heat(true), &[]));
-    for path in ["/media/0/grids_read", "/media/0/bytes_read", "/media/0/memory_bytes"] {
+    for path in [
+        "/media/0/grids_read",
+        "/media/0/bytes_read",
+        "/media/0/memory_bytes",
+    ] {
         assert!(figure(&one, path) < figure(&two, path), "{path}");
     }
     report(
@@ -165,7 +169,11 @@ fn what_is_absent_costs_nothing() {
 
     // A crop traces the rays of its window alone.
     let whole = stats(&at, &scene("bench/surface_only.json"), &[]);
-    let crop = stats(&at, &scene("bench/surface_only.json"), &["--crop", "4,4,12,8"]);
+    let crop = stats(
+        &at,
+        &scene("bench/surface_only.json"),
+        &["--crop", "4,4,12,8"],
+    );
     assert_eq!(figure(&whole, "/sampling/samples"), SAMPLES);
     assert_eq!(figure(&crop, "/sampling/samples"), 8.0 * 4.0 * 32.0);
     assert!(figure(&crop, "/counts/rays") < figure(&whole, "/counts/rays") / 6.0);
@@ -197,7 +205,10 @@ fn small_scenes_start_at_once() {
         assert!(best <= limit, "{name}: {:.1} ms", 1e3 * best);
         report(
             &format!("start-up of `{name}`"),
-            &format!("{:.1} ms of CPU time from start to end, sampling aside", 1e3 * best),
+            &format!(
+                "{:.1} ms of CPU time from start to end, sampling aside",
+                1e3 * best
+            ),
         );
     }
 }

@@ -20,10 +20,17 @@ fn direction() -> impl Strategy<Value = Vec3> {
 
 /// A rotation, a stretch over eight decades, a mirror, a move.
 fn transform() -> impl Strategy<Value = Affine> {
-    let part = (direction(), direction(), [-4f64..4.0, -4f64..4.0, -4f64..4.0]);
-    (part, [-1e6f64..1e6, -1e6f64..1e6, -1e6f64..1e6], any::<bool>()).prop_filter_map(
-        "axes too close",
-        |((x, y, log), t, mirrored)| {
+    let part = (
+        direction(),
+        direction(),
+        [-4f64..4.0, -4f64..4.0, -4f64..4.0],
+    );
+    (
+        part,
+        [-1e6f64..1e6, -1e6f64..1e6, -1e6f64..1e6],
+        any::<bool>(),
+    )
+        .prop_filter_map("axes too close", |((x, y, log), t, mirrored)| {
             let x = DVec3::new(x.x.into(), x.y.into(), x.z.into()).normalize();
             let y = DVec3::new(y.x.into(), y.y.into(), y.z.into());
             let z = x.cross(y);
@@ -37,8 +44,7 @@ fn transform() -> impl Strategy<Value = Affine> {
                 columns: [x * scale[0], y * scale[1], z * scale[2]],
                 translation: t.into(),
             })
-        },
-    )
+        })
 }
 
 proptest! {

@@ -10,7 +10,11 @@ fn rays() -> u64 {
     std::env::var("RESOLVENT_RAYS")
         .ok()
         .and_then(|v| v.parse().ok())
-        .unwrap_or(if cfg!(debug_assertions) { 20_000 } else { 300_000 })
+        .unwrap_or(if cfg!(debug_assertions) {
+            20_000
+        } else {
+            300_000
+        })
 }
 
 const MESHES: u32 = 100;

@@ -20,8 +20,7 @@ fn mixture() -> Vec<(&'static str, Value)> {
     room["camera"] = scenes::camera([0.1, -3.5, 0.2], [0.0, 1.0, -0.05], 50.0);
     scenes::diffuse(&mut room, "wall", json!([0.7, 0.6, 0.5]));
     room["materials"]["glass"] = json!({ "plugin": "dielectric", "params": { "ior": 1.5 } });
-    room["materials"]["metal"] =
-        json!({ "plugin": "conductor", "params": { "roughness": 0.2 } });
+    room["materials"]["metal"] = json!({ "plugin": "conductor", "params": { "roughness": 0.2 } });
     let fog = json!({
         "sigma_t": [0.2, 0.4, 1.5], "albedo": [0.99, 0.9, 0.5], "bounds": [-2, -2, -1, 2, 2, 2],
         "phase": scenes::hg(0.8)
@@ -105,7 +104,11 @@ fn nothing_breaks_drifts_or_grows() {
             let [a, b] = [&of[0][lane], &of[1][lane]];
             let error = a.standard_error().hypot(b.standard_error());
             let z = (a.mean() - b.mean()) / error;
-            println!("{name} [{lane}]: {:.5} then {:.5}, z = {z:.2}", a.mean(), b.mean());
+            println!(
+                "{name} [{lane}]: {:.5} then {:.5}, z = {z:.2}",
+                a.mean(),
+                b.mean()
+            );
             // Few rounds make the standard error itself uncertain: six of them instead of four.
             assert!(z.abs() < 6.0, "{name} drifts: {} {}", a.mean(), b.mean());
         }

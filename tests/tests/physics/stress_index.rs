@@ -58,12 +58,18 @@ const INDEX: &[(&str, &[(&str, &str)])] = &[
     ("hg_near_one_and_zero", &[(HG, "near_one_and_zero")]),
     (
         "g_plus_one",
-        &[(MEDIA, "coefficients"), (HG, "ends_of_the_range_are_refused")],
+        &[
+            (MEDIA, "coefficients"),
+            (HG, "ends_of_the_range_are_refused"),
+        ],
     ),
     ("g_minus_one", &[(HG, "ends_of_the_range_are_refused")]),
     (
         "g_out_of_range",
-        &[(MEDIA, "coefficients"), (HG, "ends_of_the_range_are_refused")],
+        &[
+            (MEDIA, "coefficients"),
+            (HG, "ends_of_the_range_are_refused"),
+        ],
     ),
     ("small_g_continuity", &[(MEDIA, "coefficients")]),
     ("translation", &[(PLACES, "moved_and_scaled")]),
@@ -232,10 +238,7 @@ const INDEX: &[(&str, &[(&str, &str)])] = &[
     ("emission_without_extinction", &[(MEDIA, "lanes")]),
     (
         "unbiased_transmittance",
-        &[(
-            "plugins/media/vdb/src/tests/conformance.rs",
-            "every_kernel",
-        )],
+        &[("plugins/media/vdb/src/tests/conformance.rs", "every_kernel")],
     ),
     ("bounce_limit", &[(MEDIA, "white_furnace")]),
     ("threads_and_tiles", &[(MEDIA, "threads_and_ranges")]),
@@ -274,7 +277,11 @@ fn every_row_has_a_test() {
             .collect();
         report::line(
             "stress.md",
-            &format!("| {name} | {} | {} |", text(case, "setup"), names.join(", ")),
+            &format!(
+                "| {name} | {} | {} |",
+                text(case, "setup"),
+                names.join(", ")
+            ),
         );
     }
 }

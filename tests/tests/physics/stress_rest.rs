@@ -273,7 +273,12 @@ fn huge_and_tiny_together() {
         ("tiny before huge", show(true, true, 0.0, "both"), 0.8),
         ("huge beside tiny", show(true, true, 1e-3, "beside"), 0.3),
     ] {
-        exactly(&mut out, name, &m, [albedo / std::f64::consts::PI * irradiance; 3]);
+        exactly(
+            &mut out,
+            name,
+            &m,
+            [albedo / std::f64::consts::PI * irradiance; 3],
+        );
     }
     out.assert();
 }
