@@ -84,7 +84,7 @@ class Scene:
                 unsupported(f"a light of type {light['type']}")
         self.materials = s.get("materials", {})
         self.shapes = [self.shape(x) for x in s.get("shapes", [])]
-        self.media = [self.medium(n, m, a.volumes) for n, m in s.get("media", {}).items()]
+        self.media = [self.medium(n, m, a.volumes, os.path.dirname(a.scene)) for n, m in s.get("media", {}).items()]
         if len(self.media) > 1:
             unsupported("more than one medium: overlapping media do not superpose there")
 
@@ -106,7 +106,7 @@ class Scene:
             unsupported("a shining sphere")
         return s
 
-    def medium(self, name, m, volumes):
+    def medium(self, name, m, volumes, base_of_scene):
         import numpy as np
         p = m.get("params", {})
         if m["plugin"] not in ("vdb", "homogeneous") or "transform" in m:
@@ -134,7 +134,7 @@ class Scene:
             # Cells of voxels reach half a voxel beyond their centres.
             out.update(grid=grid, low=(first - 0.5) * scale + offset, high=(first + shape - 0.5) * scale + offset,
                        support=((first + 0.0) * scale + offset, (first + shape - 1.0) * scale + offset),
-                       file=os.path.abspath(os.path.join(os.path.dirname(sys.argv[1]), p["file"])) if len(sys.argv) > 1 else None,
+                       file=os.path.abspath(os.path.join(base_of_scene, p["file"])),
                        grid_name=p.get("grid", "density"))
         elif "bounds" in p:
             out.update(low=np.array(p["bounds"][:3], float), high=np.array(p["bounds"][3:], float))

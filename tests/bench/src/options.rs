@@ -52,7 +52,7 @@ pub struct Options {
     #[arg(short, long)]
     pub quiet: bool,
 
-    /// Run a peer in the same session: mitsuba, mitsuba-scalar, cycles, pbrt
+    /// Run a peer in the same session: mitsuba, mitsuba-scalar, cycles
     #[arg(
         long,
         value_name = "PEER",

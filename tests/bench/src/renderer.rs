@@ -233,7 +233,6 @@ pub const PEERS: &[(&str, &str, &[&str])] = &[
         &["--variant", "scalar_rgb"],
     ),
     ("cycles", "cycles_peer.py", &[]),
-    ("pbrt", "pbrt_peer.py", &[]),
 ];
 
 /// A peer by name; `python` runs its adapter.
