@@ -40,7 +40,10 @@ fn time<R>(name: &str, work: usize, mut f: impl FnMut() -> R) {
         })
         .collect();
     batches.sort_by(f64::total_cmp);
-    println!("{name:44} {:8.1} ns  (middle {:.1})", batches[0], batches[7]);
+    println!(
+        "{name:44} {:8.1} ns  (middle {:.1})",
+        batches[0], batches[7]
+    );
 }
 
 fn draws(u: &mut Stream) -> FlightDraws {
@@ -79,10 +82,11 @@ fn segments(medium: &ForeignMedium, u: &mut Stream) -> Vec<(Segment, FlightDraws
 
 fn media() {
     let cloud = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cloud/cloud_s.vdb");
-    let grey = json!({"plugin": "vdb", "params": {"file": cloud, "sigma_t": 24.56, "albedo": 0.99}});
-    let chromatic =
-        json!({"plugin": "vdb", "params": {"file": cloud, "sigma_t": [2.7, 8.2, 24.56], "albedo": 0.99}});
-    let fog = json!({"plugin": "homogeneous", "params": {"sigma_t": 2, "bounds": [-1, -1, -1, 1, 1, 1]}});
+    let grey =
+        json!({"plugin": "vdb", "params": {"file": cloud, "sigma_t": 24.56, "albedo": 0.99}});
+    let chromatic = json!({"plugin": "vdb", "params": {"file": cloud, "sigma_t": [2.7, 8.2, 24.56], "albedo": 0.99}});
+    let fog =
+        json!({"plugin": "homogeneous", "params": {"sigma_t": 2, "bounds": [-1, -1, -1, 1, 1, 1]}});
     let noise = json!({"plugin": "procedural", "params": {"sigma_t": 20, "radius": 1, "center": [0, 0, 0]}});
     for (name, block) in [
         ("vdb", grey),

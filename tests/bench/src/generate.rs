@@ -66,12 +66,11 @@ pub fn ball(voxels: f64, tau: f64, resolution: [u32; 2], vdb: &Path) -> Result<V
     Ok(s)
 }
 
-/// `count` balls of fog that overlap in a ball of radius 1, together of the same optical thickness for every count.
-pub fn puffs(count: usize, resolution: [u32; 2]) -> Value {
+/// `count` balls of fog of a radius that overlap in a ball of radius 1, together with as much fog for every count.
+pub fn puffs(count: usize, radius: f64, resolution: [u32; 2]) -> Value {
     let mut s = scene(resolution, [0.0, 0.6, 5.0], [0.0; 3], 34.0);
     s["lights"] = sun_and_sky();
     let mut u = Uniform(7);
-    let radius = 0.35;
     for i in 0..count {
         let center = if count == 1 {
             [0.0; 3]
@@ -132,9 +131,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_optical_thickness_does_not_depend_on_the_count() {
+    fn the_amount_of_fog_does_not_depend_on_the_count() {
         for count in [1, 10, 1000] {
-            let s = puffs(count, [8, 8]);
+            let s = puffs(count, 0.3, [8, 8]);
             let media = s["media"].as_object().unwrap();
             assert_eq!(media.len(), count);
             let sum: f64 = media

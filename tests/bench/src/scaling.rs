@@ -90,6 +90,8 @@ pub const NAMES: &[&str] = &[
 ];
 
 const SMALL: [u32; 2] = [64, 48];
+/// Where a sample costs a millisecond.
+const FEW: [u32; 2] = [24, 18];
 
 /// Runs the series named, or all.
 pub fn measure(
@@ -255,9 +257,9 @@ fn plan(name: &str, suite: &Suite, mode: Mode, work: &Path) -> Result<Plan> {
             x: "media",
             y: sample,
             of: of_sample,
-            points: cut(&[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0], 7)
+            points: cut(&[1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0], 6)
                 .into_iter()
-                .map(|n| save(n, &generate::puffs(n as usize, SMALL), small, 32))
+                .map(|n| save(n, &generate::puffs(n as usize, 0.35, FEW), FEW.map(|n| n as usize), 32))
                 .collect::<Result<_>>()?,
         },
         "lights" => Plan {

@@ -230,7 +230,7 @@ impl Suite {
                     .join(format!("{}.json", case.name)));
             }
             Source::Big => generate::ball(BIG, 20.0, MADE, &work.join("big.vdb"))?,
-            Source::Puffs => generate::puffs(1000, MADE),
+            Source::Puffs => generate::puffs(1000, 0.18, [96, 72]),
             Source::Lights => generate::lights(1000, MADE),
         };
         generate::write(&scene, &path)?;
