@@ -39,6 +39,9 @@ pub enum Command {
     Compare(Compare),
     /// Merge checkpoints of disjoint sample ranges into one picture
     Merge(Merge),
+    /// Measure time against error on the benchmark scenes
+    #[cfg(feature = "bench")]
+    Bench(Box<resolvent_bench::Options>),
     /// List plugins, or describe one
     Plugin(Plugin),
     /// Print the JSON Schema of scene files, with the parameters of all plugins found
@@ -339,7 +342,12 @@ pub struct Merge {
     #[arg(required = true, value_name = "CHECKPOINT")]
     pub checkpoints: Vec<PathBuf>,
     /// Picture to write, .exr or .png; may be given several times
-    #[arg(short, long, value_name = "FILE", required_unless_present = "checkpoint")]
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "checkpoint"
+    )]
     pub output: Vec<PathBuf>,
     /// Write the sums as a checkpoint
     #[arg(long, value_name = "FILE")]

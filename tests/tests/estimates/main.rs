@@ -25,7 +25,9 @@ struct Shot {
 
 impl Shot {
     fn new(name: &str, integrator: &str, size: [u32; 2]) -> Self {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(name);
+        let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../scenes")
+            .join(name);
         let mut described = resolvent_scene::Scene::read(file).unwrap_or_else(|e| panic!("{e}"));
         described.film.resolution = size;
         described.film.filter = Filter::Box { radius: 0.5 };
@@ -118,7 +120,11 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     let stated_error = all.iter().map(|r| stated(r.film.errors())).sum::<f64>() / n;
     let mut means = 0.0;
     for k in 0..3 {
-        let of = |r: &Rendered| r.film.interval().map_or((f64::NAN, 0.0), |i| (i.mean[k], i.half_width[k]));
+        let of = |r: &Rendered| {
+            r.film
+                .interval()
+                .map_or((f64::NAN, 0.0), |i| (i.mean[k], i.half_width[k]))
+        };
         let truth = Moments::of(all.iter().map(|r| of(r).0)).mean();
         let inside = |r: &&Rendered| {
             let (mean, half) = of(r);

@@ -135,7 +135,10 @@ impl Film {
 
 fn floor(pixels: impl ExactSizeIterator<Item = Estimate>) -> f64 {
     let n = pixels.len().max(1) as f64;
-    let m = pixels.map(|e| e.mean.iter().sum::<f64>() / 3.0).sum::<f64>() / n;
+    let m = pixels
+        .map(|e| e.mean.iter().sum::<f64>() / 3.0)
+        .sum::<f64>()
+        / n;
     0.01 * m * m
 }
 

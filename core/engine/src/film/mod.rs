@@ -180,9 +180,9 @@ impl Film {
         if b.samples.end > net.end || (rect.min, rect.pixels()) != (b.min, b.pixels.len()) {
             return Err("a piece of work is a tile and samples of one net".into());
         }
-        self.tiles[tile].cover(b.samples.clone()).map_err(|twice| {
-            format!("samples {}..{} are taken twice", twice.start, twice.end)
-        })?;
+        self.tiles[tile]
+            .cover(b.samples.clone())
+            .map_err(|twice| format!("samples {}..{} are taken twice", twice.start, twice.end))?;
         let mut part = Part {
             samples: b.samples.end - b.samples.start,
             pixels: b.pixels.iter().map(|p| p.radiance).collect(),
@@ -288,7 +288,9 @@ impl Film {
         out.pixels = rect.indices(self.window).map(|i| self.pixels[i]).collect();
         out.tiles[0] = self.tiles[tile].clone();
         let parts = self.parts.range((tile, 0)..(tile + 1, 0));
-        out.parts = parts.map(|((_, net), part)| ((0, *net), part.clone())).collect();
+        out.parts = parts
+            .map(|((_, net), part)| ((0, *net), part.clone()))
+            .collect();
         out
     }
 
@@ -363,7 +365,6 @@ impl Film {
         }
     }
 }
-
 
 #[cfg(test)]
 mod tests;

@@ -164,8 +164,10 @@ impl Adaptive {
             return Err("is damaged: its progress does not agree with itself".into());
         }
         let rects: Vec<Rect> = film.tiles().collect();
-        let met = (rects.iter().map(|_| f.u32().map(|m| [m & 1 == 1, m & 2 == 2])))
-            .collect::<Result<Vec<_>, _>>()?;
+        let met = (rects
+            .iter()
+            .map(|_| f.u32().map(|m| [m & 1 == 1, m & 2 == 2])))
+        .collect::<Result<Vec<_>, _>>()?;
         let mut probes = BTreeMap::new();
         while !f.is_empty() {
             let (tile, second) = (f.u32()? as usize, f.u32()? == 1);
@@ -336,7 +338,8 @@ mod tests {
         let mut film = Film::new(WINDOW, false);
         for net in 0.. {
             for rect in film.tiles().take(1) {
-                film.merge(buffer(seed, rect, nets::nth(net)), &BOX).unwrap();
+                film.merge(buffer(seed, rect, nets::nth(net)), &BOX)
+                    .unwrap();
             }
             let error = film.half_error(0, 0.0).map(f64::sqrt);
             if net >= 3 && error.is_some_and(|e| e <= goal) {
