@@ -4,6 +4,7 @@
 //! usage, input or plugin, 3 interrupted with the finished part saved.
 
 mod args;
+mod check;
 mod compare;
 mod console;
 mod failure;
@@ -18,6 +19,7 @@ mod progress;
 mod render;
 mod stats;
 mod system;
+mod template;
 mod values;
 mod volume;
 
