@@ -7,6 +7,7 @@ mod args;
 #[cfg(feature = "bench")]
 mod bench;
 mod checkpoint;
+mod check;
 mod compare;
 mod console;
 mod failure;
@@ -22,6 +23,7 @@ mod progress;
 mod render;
 mod stats;
 mod system;
+mod template;
 mod values;
 mod volume;
 
