@@ -205,11 +205,11 @@ unsafe extern "C" fn one_by_one(_: *mut c_void, count: usize, task: Task, data: 
 unsafe extern "C" fn coordinates(
     _: *mut c_void,
     _: *const c_void,
-    uv: *const [f32; 2],
+    at: *const resolvent_api::SurfacePoint,
     out: *mut [f32; 4],
 ) {
     // SAFETY: the caller passes valid pointers.
-    unsafe { *out = [(*uv)[0], (*uv)[1], 0.0, 1.0] };
+    unsafe { *out = [(*at).uv[0], (*at).uv[1], 0.0, 1.0] };
 }
 
 static HOST: HostTable = HostTable {

@@ -23,9 +23,9 @@ use core::ffi::c_void;
 /// First bytes of every plugin header.
 pub const MAGIC: [u8; 8] = *b"RESOLVNT";
 /// Versions must agree exactly.
-pub const ABI_MAJOR: u32 = 1;
+pub const ABI_MAJOR: u32 = 2;
 /// The host accepts plugins of any minor version; it reads only what a table's size says is there.
-pub const ABI_MINOR: u32 = 1;
+pub const ABI_MINOR: u32 = 0;
 /// Name of the exported `static` [`PluginHeader`].
 pub const SYMBOL: &str = "resolvent_plugin";
 
@@ -278,12 +278,12 @@ pub struct HostTable {
     pub parallel_for:
         unsafe extern "C" fn(ctx: *mut c_void, count: usize, task: Task, data: *const c_void),
     /// Writes red, green, blue and alpha of `texture` (the `instance` of a [`ParamValue`] of the kind [`ParamKind::Texture`]) at
-    /// the texture coordinates `uv` to `out`: linear, clamped to the parameter's range, always finite. It takes no lock and
-    /// allocates nothing. Since minor version 1: there if `size` reaches it.
+    /// a point of a surface to `out`: linear, clamped to the parameter's range, always finite. It takes no lock and allocates
+    /// nothing.
     pub texture: unsafe extern "C" fn(
         ctx: *mut c_void,
         texture: *const c_void,
-        uv: *const [f32; 2],
+        at: *const SurfacePoint,
         out: *mut [f32; 4],
     ),
 }

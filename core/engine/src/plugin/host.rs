@@ -2,6 +2,7 @@
 
 use crate::texture::Binding;
 use rayon::prelude::*;
+use resolvent_api::SurfacePoint;
 use resolvent_api::abi::{ABI_MINOR, HostTable, Task, Text};
 use std::cell::RefCell;
 use std::ffi::c_void;
@@ -69,11 +70,11 @@ pub(super) static HOST: HostTable = HostTable {
 unsafe extern "C" fn texture(
     _: *mut c_void,
     texture: *const c_void,
-    uv: *const [f32; 2],
+    at: *const SurfacePoint,
     out: *mut [f32; 4],
 ) {
     // SAFETY: the plugin passes a handle that its instance was made with, which keeps the binding alive, and valid pointers.
-    unsafe { *out = (*texture.cast::<Binding>()).at(*uv) };
+    unsafe { *out = (*texture.cast::<Binding>()).at((*at).uv, &(*at).color) };
 }
 
 unsafe extern "C" fn log(_: *mut c_void, level: u32, message: Text) {
