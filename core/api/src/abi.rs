@@ -301,6 +301,14 @@ pub struct HostTable {
         uv: *const [f32; 2],
         out: *mut [f32; 4],
     ),
+    /// The same at a point of a surface: textures may depend on more of it than its texture coordinates (the colours of its mesh),
+    /// which [`HostTable::texture`] takes for white. Since minor version 2: there if `size` reaches it.
+    pub texture_at: unsafe extern "C" fn(
+        ctx: *mut c_void,
+        texture: *const c_void,
+        at: *const SurfacePoint,
+        out: *mut [f32; 4],
+    ),
 }
 
 // SAFETY: the host's functions may be called from any thread.

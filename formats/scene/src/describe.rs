@@ -485,6 +485,11 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// One texture coordinate per corner, or empty.
     pub uvs: Vec<[f64; 2]>,
+    /// One linear colour and opacity per corner, or empty: what textures with [`Texture::vertex_color`] are multiplied with.
+    pub colors: Vec<[f64; 4]>,
+    /// One tangent per corner, or empty: the direction of growing u for normal maps and anisotropy, and with a negative fourth
+    /// number growing v on the other side of it than usual. Without any they are taken from the texture coordinates.
+    pub tangents: Vec<[f64; 4]>,
     /// The mesh's space to world.
     pub transform: Transform,
 }

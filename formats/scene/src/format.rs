@@ -122,6 +122,10 @@ pub(crate) enum Kind {
     Vec3s,
     /// A list of pairs of numbers.
     Pairs,
+    /// A list of lists of four numbers.
+    Fours,
+    /// A list of lists of three or four numbers ≥ 0.
+    Colors,
     /// A list of three indices each.
     Triangles,
     /// One number or three, ≥ 0.
@@ -460,7 +464,7 @@ const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror"]);
 
 static TEXTURE: Object = Object {
     name: "texture",
-    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one",
+    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one; or vertex colours",
     fields: &[
         may(
             "file",
@@ -468,6 +472,11 @@ static TEXTURE: Object = Object {
             "The image file, relative to the scene file",
         ),
         may("data", Kind::Name, "The image file's bytes in base64"),
+        may(
+            "vertex_color",
+            Kind::Bool,
+            "Multiplies the image, or white without one, with the mesh's colours (false)",
+        ),
         may(
             "color_space",
             Kind::Choice(&["auto", "srgb", "linear", "raw"]),
@@ -503,7 +512,8 @@ static TEXTURE: Object = Object {
         ),
     ],
     rules: &[
-        Rule::ExactlyOne(&["file", "data"]),
+        Rule::AtLeastOne(&["file", "data", "vertex_color"]),
+        Rule::AtMostOne(&["file", "data"]),
         Rule::AtMostOne(&["wrap", "wrap_u"]),
         Rule::AtMostOne(&["wrap", "wrap_v"]),
     ],
@@ -812,6 +822,16 @@ static MESH: Object = Object {
         ),
         may("normals", Kind::Vec3s, "One shading normal per corner"),
         may("uvs", Kind::Pairs, "One texture coordinate per corner"),
+        may(
+            "colors",
+            Kind::Colors,
+            "One linear RGB or RGBA per corner, for textures with vertex_color",
+        ),
+        may(
+            "tangents",
+            Kind::Fours,
+            "Direction of growing u per corner, and a sign: -1 where v grows on the other side",
+        ),
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,

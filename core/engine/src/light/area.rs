@@ -1,7 +1,7 @@
 //! Emitting shapes.
 
 use super::{Distribution, per_solid_angle};
-use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh};
+use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh, mixed};
 use crate::texture::Binding;
 use resolvent_api::Spectrum;
 use resolvent_api::math::{Frame, Vec3, warp};
@@ -40,6 +40,8 @@ pub struct AreaPoint {
     pub prim: u32,
     /// Texture coordinates, on meshes and parallelograms; zero elsewhere.
     pub uv: [f32; 2],
+    /// Colour of meshes that have colours; else white.
+    pub color: [f32; 4],
 }
 
 impl AreaPoint {
@@ -163,13 +165,13 @@ impl Area {
         self
     }
 
-    /// Emitted radiance at texture coordinates.
+    /// Emitted radiance at texture coordinates, where the mesh has the colour `color`.
     #[inline]
-    pub fn radiance_at(&self, uv: [f32; 2]) -> Spectrum {
+    pub fn radiance_at(&self, uv: [f32; 2], color: &[f32; 4]) -> Spectrum {
         match &self.texture {
             None => self.radiance,
             Some((texture, _)) => {
-                let [r, g, b, _] = texture.at(uv);
+                let [r, g, b, _] = texture.at(uv, color);
                 self.radiance * Spectrum::rgb(r, g, b)
             }
         }
@@ -199,7 +201,7 @@ impl Area {
     /// Chooses a point, uniform in area.
     #[inline]
     pub fn point(&self, u: [f32; 2]) -> Option<AreaPoint> {
-        let mut uv = [0.0; 2];
+        let (mut uv, mut color) = ([0.0; 2], [1.0; 4]);
         let (p, size, ng, prim) = match &self.form {
             AreaShape::Quad(q, ng) => {
                 let p = q.corner + q.edge_u * u[0] + q.edge_v * u[1];
@@ -226,6 +228,9 @@ impl Area {
                         (a + (b - a) * s + (c - a) * t).into()
                     }
                 };
+                if !mesh.colors.is_empty() {
+                    color = mixed(mesh.indices[i].map(|i| mesh.colors[i as usize]), s, t);
+                }
                 (p, size, ng, i as u32)
             }
             AreaShape::Sphere(s) => {
@@ -254,6 +259,7 @@ impl Area {
             ng,
             prim,
             uv,
+            color,
         })
     }
 
@@ -269,7 +275,7 @@ impl Area {
         Some(LightSample {
             wi: (d / distance).into(),
             distance,
-            radiance: self.radiance_at(at.uv),
+            radiance: self.radiance_at(at.uv, &at.color),
             density,
             light: NONE,
             flags: 0,
@@ -301,6 +307,7 @@ impl Area {
             ng: n,
             prim: 0,
             uv: [0.0; 2],
+            color: [1.0; 4],
         };
         self.finish(from, &at, 1.0 / (2.0 * PI * one_minus_cos))
     }

@@ -237,7 +237,7 @@ fn per_solid_angle(per_area: f32, from: Vec3, at: Vec3, ng: Vec3) -> f32 {
 /// The radiance an area light shows towards `w` from the point with normal `ng`.
 pub fn shows(area: &Area, at: &SurfacePoint, w: Vec3) -> Spectrum {
     if area.two_sided || at.ng.dot(w) > 0.0 {
-        area.radiance_at(at.uv.into())
+        area.radiance_at(at.uv.into(), &at.color)
     } else {
         Spectrum::ZERO
     }
