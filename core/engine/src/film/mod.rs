@@ -3,6 +3,7 @@
 //! Every sample is rounded once, to a multiple of 2⁻⁶⁴, and added as an integer. Any division of the work into tiles, sample
 //! ranges, threads or machines gives the same bits.
 
+mod orders;
 mod splat;
 
 pub use splat::Splats;
@@ -78,6 +79,8 @@ pub struct Buffer {
     in_batch: u32,
     current: Option<(u32, u32)>,
     first_sample: u32,
+    /// Light by scattering order, if wanted.
+    orders: Option<orders::Layers>,
     /// Light from walks that started at lights.
     pub splats: Splats,
     /// Samples that were left out.
@@ -104,9 +107,39 @@ impl Buffer {
             in_batch: 0,
             current: None,
             first_sample,
+            orders: None,
             splats: Splats::default(),
             rejected: 0,
             rejected_at: None,
+        }
+    }
+
+    /// With `count` layers of light by scattering order, the last for all that was scattered more often.
+    pub fn with_orders(mut self, count: usize) -> Self {
+        self.orders = (count > 0).then(|| orders::Layers::new(count, self.pixels.len()));
+        self
+    }
+
+    /// Number of layers of light by scattering order.
+    pub fn orders(&self) -> usize {
+        self.orders.as_ref().map_or(0, orders::Layers::count)
+    }
+
+    /// As [`Buffer::add`], with the sample's radiance by scattering order.
+    pub fn add_orders(
+        &mut self,
+        x: u32,
+        y: u32,
+        s: &PixelSample,
+        layers: &[Spectrum],
+    ) -> Result<(), String> {
+        let rejected = self.rejected;
+        self.add(x, y, s)?;
+        let i = ((y - self.min[1]) * self.width + (x - self.min[0])) as usize;
+        match &mut self.orders {
+            // What the picture left out, its layers leave out.
+            Some(orders) if self.rejected == rejected => orders.add(i, s.radiance, layers),
+            _ => Ok(()),
         }
     }
 
@@ -194,6 +227,8 @@ pub struct Film {
     window: [u32; 4],
     pixels: Vec<Pixel>,
     features: Vec<FeatureSums>,
+    /// Light by scattering order, if wanted: from walks that started at the sensor, and from the others.
+    orders: Option<(orders::Layers, orders::Layers)>,
     /// Light from walks that started at lights, once there is any.
     splats: Option<splat::Sums>,
     /// Pieces of work merged, and their samples.
@@ -236,9 +271,17 @@ impl Film {
             } else {
                 Vec::new()
             },
+            orders: None,
             splats: None,
             pieces: (0, 0),
         }
+    }
+
+    /// With `count` layers of light by scattering order, the last for all that was scattered more often.
+    pub fn with_orders(mut self, count: usize) -> Self {
+        let layers = orders::Layers::new(count, self.pixels.len());
+        self.orders = (count > 0).then(|| (layers.clone(), layers));
+        self
     }
 
     /// Width and height of the window.
@@ -261,7 +304,11 @@ impl Film {
             self.splats = Some(sums);
         }
         if let Some(sums) = &mut self.splats {
-            sums.add(&b.splats, self.window, filter, samples);
+            sums.add(&b.splats, self.window, filter, samples, |i, order, value| {
+                if let Some((_, splats)) = &mut self.orders {
+                    splats.deposit(i, order, value);
+                }
+            });
         }
         self.pieces.0 += 1;
         self.pieces.1 += samples;
@@ -278,6 +325,9 @@ impl Film {
             q.alpha += p.alpha;
             q.samples += p.samples;
             q.batches += p.batches;
+            if let (Some(from), Some((to, _))) = (&b.orders, &mut self.orders) {
+                to.merge(at, from, i);
+            }
             if let (Some(f), Some(g)) = (b.features.get(i), self.features.get_mut(at)) {
                 g.depth += f.depth;
                 g.hits += f.hits;
@@ -321,6 +371,17 @@ impl Film {
             alpha: float(p.alpha) / n,
             samples: p.samples,
         }
+    }
+
+    /// Mean radiance of layer `k` by scattering order at pixel `i`; zero if there are no layers.
+    pub fn order(&self, i: usize, k: usize) -> [f64; 3] {
+        let Some((walks, splats)) = &self.orders else {
+            return [0.0; 3];
+        };
+        let n = f64::from(self.pixels[i].samples.max(1));
+        let m = self.splats.as_ref().map_or(1.0, splat::Sums::samples);
+        let (a, b) = (walks.sum(i, k), splats.sum(i, k));
+        [0, 1, 2].map(|lane| float(a[lane]) / n + float(b[lane]) / m)
     }
 
     /// The features of pixel `i`; zero if they were not asked for.

@@ -10,19 +10,25 @@ use resolvent_api::Spectrum;
 /// Fractional bits of the sums of squares.
 const SQUARES: i32 = 80;
 
-/// The splats of one piece of work, in order.
+/// The splats of one piece of work, in order: where, what, and how often scattered.
 #[derive(Clone, Debug, Default)]
-pub struct Splats(Vec<([f32; 2], [f32; 3])>);
+pub struct Splats(Vec<([f32; 2], [f32; 3], u32)>);
 
 impl Splats {
     /// Adds light at a position in pixels; false if it is not finite, or too large, and left out.
     #[inline]
     pub fn add(&mut self, film: [f32; 2], radiance: Spectrum) -> bool {
+        self.add_order(film, radiance, 0)
+    }
+
+    /// As [`Splats::add`], for light scattered `order` times.
+    #[inline]
+    pub fn add_order(&mut self, film: [f32; 2], radiance: Spectrum, order: u32) -> bool {
         let value = [radiance[0], radiance[1], radiance[2]];
         let good = value.iter().all(|v| v.is_finite() && v.abs() <= LARGEST)
             && film.iter().all(|v| v.is_finite());
         if good && value != [0.0; 3] {
-            self.0.push((film, value));
+            self.0.push((film, value, order));
         }
         good
     }
@@ -64,12 +70,19 @@ impl Sums {
         self.samples += samples;
     }
 
-    /// Adds a piece of `samples` samples of a film with the given window.
-    pub fn add(&mut self, splats: &Splats, window: [u32; 4], filter: &Filter, samples: u64) {
+    /// Adds a piece of `samples` samples of a film with the given window; `heard` is told what each pixel gets, and its order.
+    pub fn add(
+        &mut self,
+        splats: &Splats,
+        window: [u32; 4],
+        filter: &Filter,
+        samples: u64,
+        mut heard: impl FnMut(usize, u32, [i128; 3]),
+    ) {
         let [x0, y0, x1, y1] = window.map(|v| v as f32);
         let width = window[2] - window[0];
         let r = filter.radius();
-        for (film, value) in &splats.0 {
+        for (film, value, order) in &splats.0 {
             // Pixels whose centre is within the radius.
             let from = |v: f32, low: f32| (v - r - 0.5).ceil().max(low);
             let to = |v: f32, high: f32| (v + r - 0.5).floor().min(high - 1.0);
@@ -81,7 +94,9 @@ impl Sums {
                     let w = wy * filter.value(film[0] - (x + 0.5));
                     if w > 0.0 {
                         let i = (y as u32 - window[1]) * width + (x as u32 - window[0]);
-                        self.deposit(i, value.map(|v| fix(v * w)));
+                        let value = value.map(|v| fix(v * w));
+                        self.deposit(i, value);
+                        heard(i as usize, *order, value);
                     }
                     x += 1.0;
                 }
@@ -114,9 +129,20 @@ impl Sums {
         }
     }
 
+    /// Samples of all pieces.
+    pub fn samples(&self) -> f64 {
+        self.samples.max(1) as f64
+    }
+
+    /// The sum of pixel `i`.
+    #[cfg(test)]
+    pub fn sum(&self, i: usize) -> [i128; 3] {
+        self.sum[i]
+    }
+
     /// Mean of pixel `i` and its variance, if there were two pieces.
     pub fn estimate(&self, i: usize) -> ([f64; 3], Option<[f64; 3]>) {
-        let n = self.samples.max(1) as f64;
+        let n = self.samples();
         let mean = self.sum[i].map(|s| float(s) / n);
         let variance = (self.pieces >= 2).then(|| {
             [0, 1, 2].map(|lane| {
@@ -164,8 +190,8 @@ mod tests {
                 for k in 0..8 {
                     // 320 positions on 20 × 16 pixels: the samples of a film where each pixel has one.
                     let p = piece(film * 8 + k, 320);
-                    sums.add(&p, WINDOW, &filter, 320);
-                    one.add(&p, WINDOW, &filter, 320);
+                    sums.add(&p, WINDOW, &filter, 320, |_, _, _| {});
+                    one.add(&p, WINDOW, &filter, 320, |_, _, _| {});
                 }
                 estimates.push((one.estimate(33).0[1], one.estimate(33).1.unwrap()[1]));
             }
@@ -193,7 +219,8 @@ mod tests {
         let run = |order: &[u64]| {
             let mut sums = Sums::new(80);
             for k in order {
-                sums.add(&piece(*k, 100 + *k as u32), WINDOW, &filter, 50 + k);
+                let p = piece(*k, 100 + *k as u32);
+                sums.add(&p, WINDOW, &filter, 50 + k, |_, _, _| {});
             }
             sums.skip(1, 10);
             (0..80).map(|i| sums.estimate(i)).collect::<Vec<_>>()

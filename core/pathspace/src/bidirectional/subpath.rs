@@ -48,13 +48,9 @@ impl Node {
 pub struct Subpath {
     nodes: Vec<Node>,
     len: usize,
-    /// Radiance that media emit along the walk (walks from the sensor).
-    pub emitted: Spectrum,
-    /// The part of it that the last edge gave, and how many edges there were: one more than vertices to arrive at if the
-    /// light was lost.
-    pub last_emitted: Spectrum,
-    /// Edges walked.
-    pub edges: usize,
+    /// Radiance that media emit along each edge walked (walks from the sensor): one more than vertices to arrive at if the
+    /// light was lost. That of edge k was scattered k times.
+    pub emitted: Vec<Spectrum>,
     /// Density of the start when it is chosen as seen from the vertex after it (walks from a light), once it was asked for.
     chosen: Option<f64>,
 }
@@ -84,9 +80,7 @@ impl Subpath {
     /// Forgets the walk.
     pub fn clear(&mut self) {
         self.len = 0;
-        self.emitted = Spectrum::ZERO;
-        self.last_emitted = Spectrum::ZERO;
-        self.edges = 0;
+        self.emitted.clear();
         self.chosen = None;
     }
 
@@ -200,10 +194,8 @@ impl Subpath {
                 let (edge, next) = (&mut node.edge, &mut node.vertex);
                 scene.propagate(&from.vertex, direction, &flight, edge, next)?
             };
-            self.edges += 1;
             if end == End::Sensor {
-                self.last_emitted = beta.f * node.edge.emitted;
-                self.emitted += self.last_emitted;
+                self.emitted.push(beta.f * node.edge.emitted);
             }
             let arrived = alive && (end == End::Sensor || !node.vertex.is(VertexKind::Emitter));
             if !arrived {

@@ -22,6 +22,7 @@ use resolvent_api::abi::{ParamDecl, Tile};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
 use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::orders::{Orders, Together};
 
 /// The integrator.
 struct Bidirectional {
@@ -95,10 +96,11 @@ impl Integrator for Bidirectional {
             only: self.only,
         };
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
-        if scene.is_grey() {
-            kernel.tile::<false>(tile, out)
-        } else {
-            kernel.tile::<true>(tile, out)
+        match (scene.is_grey(), out.orders()) {
+            (true, 0) => kernel.tile::<false, _>(tile, out, Together),
+            (true, n) => kernel.tile::<false, _>(tile, out, Orders::new(n)),
+            (false, 0) => kernel.tile::<true, _>(tile, out, Together),
+            (false, n) => kernel.tile::<true, _>(tile, out, Orders::new(n)),
         }
     }
 }

@@ -25,6 +25,7 @@ use kernel::{Kernel, Settings};
 use resolvent_api::abi::{ParamDecl, Tile};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
+use resolvent_pathspace::orders::{Orders, Together};
 
 /// The integrator.
 struct Metropolis {
@@ -82,10 +83,11 @@ impl Plugin for Metropolis {
 impl Integrator for Metropolis {
     fn render(&self, scene: &SceneView<'_>, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
         let mut kernel = Kernel::new(scene, self.settings, tile);
-        if scene.is_grey() {
-            kernel.piece::<false>(tile, out)
-        } else {
-            kernel.piece::<true>(tile, out)
+        match (scene.is_grey(), out.orders()) {
+            (true, 0) => kernel.piece::<false, _>(tile, out, Together),
+            (true, n) => kernel.piece::<false, _>(tile, out, Orders::new(n)),
+            (false, 0) => kernel.piece::<true, _>(tile, out, Together),
+            (false, n) => kernel.piece::<true, _>(tile, out, Orders::new(n)),
         }
     }
 }
