@@ -57,7 +57,12 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     }
     seconds.build(&built.preparation);
     let features = output::wants_features(&described);
-    output::check_memory(described.film.window(), features, described.film.aovs.len())?;
+    output::check_memory(
+        described.film.window(),
+        features,
+        described.film.aovs.len(),
+        described.film.order_layers(),
+    )?;
 
     let rendered = render(&built, &integrator, &described, &plan);
     interrupt::enter(Phase::Writing);
@@ -194,6 +199,7 @@ fn render(
         goal: plan.goal,
         seed: described.sampling.seed,
         features: output::wants_features(described),
+        orders: described.film.order_layers(),
     };
     let display = Display::new(plan.goal, plan.samples.len() as u32);
     interrupt::enter(Phase::Rendering);

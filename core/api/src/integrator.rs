@@ -293,12 +293,7 @@ impl<'a> Output<'a> {
     ///
     /// # Panics
     /// If no layers are wanted.
-    pub fn splat_order(
-        &mut self,
-        film: [f32; 2],
-        radiance: Spectrum,
-        order: u32,
-    ) -> Outcome<()> {
+    pub fn splat_order(&mut self, film: [f32; 2], radiance: Spectrum, order: u32) -> Outcome<()> {
         assert_ne!(self.orders(), 0, "layers of scattering orders");
         let ctx = self.table.ctx;
         // SAFETY: as above; the table reaches this function, since it wants layers.

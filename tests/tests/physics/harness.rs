@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use resolvent_api::{Affine, PluginKind};
+use resolvent_engine::film::Film;
 use resolvent_engine::plugin::{ForeignIntegrator, Registry};
 use resolvent_engine::scene::{Counters, Scene};
 use resolvent_engine::{Goal, Rendered, Settings, render};
@@ -110,6 +111,7 @@ pub struct Ready {
     scene: Scene,
     integrator: ForeignIntegrator,
     resolution: [u32; 2],
+    orders: usize,
 }
 
 /// Builds what a JSON scene describes.
@@ -134,6 +136,7 @@ pub fn build(scene: &Value) -> Result<Ready, String> {
         scene,
         integrator,
         resolution: described.film.resolution,
+        orders: described.film.order_layers(),
     })
 }
 
@@ -155,6 +158,7 @@ impl Ready {
             goal: Goal::Samples,
             seed,
             features: false,
+            orders: self.orders,
         };
         let rendered = render(
             &self.scene,
@@ -169,6 +173,14 @@ impl Ready {
         rendered
     }
 
+    /// Mean radiance of pixel `i`; of a scene with layers by scattering order, in the last that has one order alone.
+    fn radiance(&self, film: &Film, i: usize) -> [f64; 3] {
+        match self.orders {
+            0 => film.estimate(i).mean,
+            n => film.order(i, n - 2),
+        }
+    }
+
     /// The mean over all pixels of samples `begin` to `end`, and its standard error by the spread of the pixels, which are
     /// independent.
     pub fn measure_range(&self, seed: u64, begin: u32, end: u32) -> Measured {
@@ -178,7 +190,7 @@ impl Ready {
         let mut out = Measured::default();
         for i in 0..count {
             let e = rendered.film.estimate(i);
-            for (moments, mean) in lanes.iter_mut().zip(e.mean) {
+            for (moments, mean) in lanes.iter_mut().zip(self.radiance(&rendered.film, i)) {
                 moments.add(mean);
             }
             out.alpha += e.alpha / count as f64;

@@ -16,6 +16,7 @@ mod instances;
 mod lights;
 mod materials;
 mod nested;
+mod orders;
 mod points;
 mod slab_flux;
 mod slab_radiance;

@@ -104,7 +104,7 @@ fn slab_orders() {
                     }
                     let mut scene =
                         seen(e, "beam_direction", vector(v, &format!("exit_dir_{side}")));
-                    scene["integrator"]["params"] = json!({ "orders": n });
+                    scenes::scattered(&mut scene, n);
                     cases.push(Case { name, scene, exact });
                 }
             }

@@ -304,11 +304,17 @@ impl Film {
             self.splats = Some(sums);
         }
         if let Some(sums) = &mut self.splats {
-            sums.add(&b.splats, self.window, filter, samples, |i, order, value| {
-                if let Some((_, splats)) = &mut self.orders {
-                    splats.deposit(i, order, value);
-                }
-            });
+            sums.add(
+                &b.splats,
+                self.window,
+                filter,
+                samples,
+                |i, order, value| {
+                    if let Some((_, splats)) = &mut self.orders {
+                        splats.deposit(i, order, value);
+                    }
+                },
+            );
         }
         self.pieces.0 += 1;
         self.pieces.1 += samples;

@@ -239,7 +239,11 @@ impl<'a> Kernel<'a> {
             let mut draws = NetDraws::new(tile.seed, p.index, p.sample, scene.lanes());
             let wanted = tile.features != 0;
             let mut sample = paths.look::<CHROMATIC, _>(scene, p.pixel, &mut draws, 2, wanted)?;
-            sample.radiance = paths.sensor.emitted.iter().fold(Spectrum::ZERO, |a, e| a + *e);
+            sample.radiance = paths
+                .sensor
+                .emitted
+                .iter()
+                .fold(Spectrum::ZERO, |a, e| a + *e);
             if paths.sensor.len() > 1 {
                 sample.radiance += paths.hit(scene, 2)?;
             }
@@ -250,12 +254,7 @@ impl<'a> Kernel<'a> {
 }
 
 /// Adds a state to the film with its share of the steps, `weight` in units of the chain's mean.
-fn record<T: Tally>(
-    out: &mut Output<'_>,
-    tally: &T,
-    s: &Sample,
-    weight: f64,
-) -> Outcome<()> {
+fn record<T: Tally>(out: &mut Output<'_>, tally: &T, s: &Sample, weight: f64) -> Outcome<()> {
     if weight > 0.0 {
         let scale = (weight / s.importance) as f32;
         tally.splat(out, s.film, s.radiance * scale, s.order)?;
