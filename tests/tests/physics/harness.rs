@@ -121,12 +121,33 @@ pub struct Ready {
 pub fn build(scene: &Value) -> Result<Ready, String> {
     let text = serde_json::to_vec_pretty(scene).map_err(|e| e.to_string())?;
     let described = resolvent_scene::Scene::parse(&text, "test.json").map_err(|e| e.to_string())?;
-    let scene = Scene::build(&described, registry()).map_err(|e| e.to_string())?;
+    build_described(&described)
+}
+
+/// An example scene, by its path there, with this integrator.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn open(path: &str, integrator: &str) -> Ready {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../scenes")
+        .join(path);
+    let ready = resolvent_scene::Scene::read(&file)
+        .map_err(|e| e.to_string())
+        .and_then(|mut described| {
+            described.integrator = resolvent_scene::PluginBlock::new(integrator);
+            build_described(&described)
+        });
+    ready.unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+fn build_described(described: &resolvent_scene::Scene) -> Result<Ready, String> {
+    let scene = Scene::build(described, registry()).map_err(|e| e.to_string())?;
     let instance = registry()
         .instantiate(
             PluginKind::Integrator,
             &described.integrator,
-            &described,
+            described,
             &Affine::IDENTITY,
             scene.lanes,
         )

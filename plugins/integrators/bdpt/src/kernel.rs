@@ -2,10 +2,11 @@
 
 use resolvent_api::abi::{PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
+use resolvent_api::params::Host;
 use resolvent_api::rng::Stream;
 use resolvent_api::{Output, SceneView, VertexKind};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
 use resolvent_pathspace::orders::Tally;
 use resolvent_pathspace::sampler::Purpose;
 use resolvent_pathspace::samples;
@@ -20,6 +21,12 @@ pub struct Kernel<'a> {
     pub connections: f32,
     /// How weights are made.
     pub heuristic: Heuristic,
+    /// What they take for media.
+    pub media: MediaDensities,
+    /// Recompute all paths.
+    pub verify: bool,
+    /// Where a difference is reported.
+    pub host: Host,
     /// Only strategies with this many vertices from the light, and from the sensor.
     pub only: [Option<usize>; 2],
 }
@@ -40,12 +47,16 @@ impl Kernel<'_> {
         } else {
             Heuristic::Alone
         };
-        let mut paths = Bidirectional::new(walks, heuristic);
-        samples::each(tile, out, tally, |out, tally, p| {
+        let mut paths = Bidirectional::new(walks, heuristic, self.media).verify(self.verify);
+        let done = samples::each(tile, out, tally, |out, tally, p| {
             let mut draws = NetDraws::new(tile.seed, p.index, p.sample, self.scene.lanes());
             let wanted = tile.features != 0;
             self.sample::<CHROMATIC, T>(&mut paths, p.pixel, &mut draws, wanted, tally, out)
-        })
+        });
+        if let Some(difference) = paths.difference() {
+            self.host.fail(difference);
+        }
+        done
     }
 
     fn sample<const CHROMATIC: bool, T: Tally>(

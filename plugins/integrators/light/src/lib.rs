@@ -16,7 +16,7 @@ use resolvent_api::abi::{ParamDecl, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
 use resolvent_pathspace::bidirectional::{Bidirectional, NetDraws};
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
 use resolvent_pathspace::orders::{Orders, Tally, Together};
 use resolvent_pathspace::samples;
 
@@ -61,7 +61,7 @@ impl ParticleTracer {
         out: &mut Output<'_>,
         tally: T,
     ) -> Outcome<()> {
-        let mut paths = Bidirectional::new(1.0, Heuristic::Alone);
+        let mut paths = Bidirectional::new(1.0, Heuristic::Alone, MediaDensities::Exact);
         let emits = scene.has(scene_traits::LIGHTS) || scene.has(scene_traits::HITTABLE_LIGHTS);
         // The light's own vertex, and one for each scattering.
         let limit = (self.max_depth as usize).saturating_add(1);

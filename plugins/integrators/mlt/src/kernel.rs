@@ -5,8 +5,8 @@ use resolvent_api::integrator::Outcome;
 use resolvent_api::rng::{Stream, derive, mix};
 use resolvent_api::{Output, SceneView, Spectrum};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
-use resolvent_pathspace::chain::Chain;
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::chain::{Chain, Sizes};
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
 use resolvent_pathspace::orders::Tally;
 use resolvent_pathspace::sampler::Purpose;
 use resolvent_pathspace::samples;
@@ -18,12 +18,14 @@ pub struct Settings {
     pub max_depth: u32,
     /// Share of large steps.
     pub large_steps: f32,
-    /// Standard deviation of small steps.
-    pub sigma: f32,
+    /// Standard deviations of small steps.
+    pub sizes: Sizes,
     /// Each number of scattering events is proposed this much less often than the one before.
     pub ratio: f64,
     /// Independent paths for each step.
     pub seeds: f64,
+    /// Recompute all paths.
+    pub verify: bool,
 }
 
 /// What a state of the chain carries to the film.
@@ -61,15 +63,21 @@ impl<'a> Kernel<'a> {
         } else {
             Heuristic::Alone
         };
-        let paths = Bidirectional::new(area, heuristic);
+        let paths = Bidirectional::new(area, heuristic, MediaDensities::Exact);
+        let paths = paths.verify(settings.verify);
         Self {
             scene,
             settings,
             paths,
-            chain: Chain::new(settings.sigma, scene.lanes()),
+            chain: Chain::new(settings.sizes, scene.lanes()),
             corner: [x0 - m, y0 - m],
             extent,
         }
+    }
+
+    /// What was found to differ when it was recomputed.
+    pub fn difference(&self) -> Option<&str> {
+        self.paths.difference()
     }
 
     /// Renders a piece of work: as many steps as it has samples.
