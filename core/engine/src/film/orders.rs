@@ -4,7 +4,8 @@
 //! integrator's sums; what is left by that goes to the largest of them. A splat belongs to one layer. So the layers' sums add up to
 //! the picture's, bit for bit, and the picture is what it is without them.
 
-use super::{LARGEST, fix, float};
+use super::fixed::{add, fits, fix, float};
+use crate::checkpoint::sections::Fields;
 use resolvent_api::Spectrum;
 
 /// By how much of its light a sample's layers may fail to sum to its radiance: what sums of some thousand f32 in another order
@@ -40,7 +41,7 @@ impl Layers {
             let (mut rest, mut total, mut largest) = (fix(radiance[lane]), 0f32, 0);
             for (k, (sum, layer)) in sums.iter_mut().zip(layers).enumerate() {
                 let v = layer[lane];
-                if !(v.abs() <= LARGEST) {
+                if !fits(v) {
                     return Err(format!("gave light of {v} to the scattering order {k}"));
                 }
                 let fixed = fix(v);
@@ -66,26 +67,75 @@ impl Layers {
     /// Adds light to layer `k` of pixel `i`.
     pub fn deposit(&mut self, i: usize, k: u32, value: [i128; 3]) {
         let k = (k as usize).min(self.count - 1);
-        let sum = &mut self.sums[i * self.count + k];
-        for lane in 0..3 {
-            sum[lane] += value[lane];
-        }
+        add(&mut self.sums[i * self.count + k], value);
     }
 
     /// Adds pixel `j` of other layers to pixel `i`.
     pub fn merge(&mut self, i: usize, other: &Self, j: usize) {
         let from = &other.sums[j * self.count..][..self.count];
         let to = &mut self.sums[i * self.count..][..self.count];
-        for (a, b) in to.iter_mut().zip(from) {
-            for lane in 0..3 {
-                a[lane] += b[lane];
-            }
-        }
+        to.iter_mut().zip(from).for_each(|(a, b)| add(a, *b));
     }
 
     /// The sum of layer `k` at pixel `i`.
     pub fn sum(&self, i: usize, k: usize) -> [i128; 3] {
         self.sums[i * self.count + k]
+    }
+}
+
+/// The layers of a film.
+#[derive(Clone, Debug)]
+pub(super) struct Orders {
+    /// Light from walks that started at the sensor.
+    pub walks: Layers,
+    /// Light from the others.
+    pub splats: Layers,
+}
+
+impl Orders {
+    /// `count` black layers of `pixels` pixels.
+    pub fn new(count: usize, pixels: usize) -> Self {
+        let walks = Layers::new(count, pixels);
+        let splats = walks.clone();
+        Self { walks, splats }
+    }
+
+    /// Adds the layers of another film.
+    pub fn join(&mut self, other: &Self) {
+        let pairs = [
+            (&mut self.walks, &other.walks),
+            (&mut self.splats, &other.splats),
+        ];
+        for (to, from) in pairs {
+            let sums = to.sums.iter_mut().zip(&from.sums);
+            sums.for_each(|(a, b)| add(a, *b));
+        }
+    }
+
+    /// All sums, for a checkpoint.
+    pub fn sums(&self) -> impl Iterator<Item = &[i128; 3]> {
+        self.walks.sums.iter().chain(&self.splats.sums)
+    }
+
+    /// Reads what [`Orders::sums`] gave, for a film of `pixels` pixels.
+    ///
+    /// # Errors
+    /// If that is no whole number of layers.
+    pub fn read(mut f: Fields, pixels: usize) -> Result<Self, String> {
+        let mut walks = Vec::new();
+        while !f.is_empty() {
+            walks.push(f.three()?);
+        }
+        if walks.is_empty() || !walks.len().is_multiple_of(2 * pixels) {
+            return Err("its layers by scattering order are cut off".into());
+        }
+        let splats = walks.split_off(walks.len() / 2);
+        let count = walks.len() / pixels;
+        let layers = |sums| Layers { count, sums };
+        Ok(Self {
+            walks: layers(walks),
+            splats: layers(splats),
+        })
     }
 }
 
@@ -105,7 +155,8 @@ mod tests {
         let mut film = Film::new([0, 0, 4, 2], false).with_orders(COUNT);
         let mut s = Stream::new(3);
         for piece in 0..6 {
-            let mut b = Buffer::new([0, 0], [4, 2], 16 * piece, false).with_orders(COUNT);
+            let samples = 16 * piece..16 * (piece + 1);
+            let mut b = Buffer::new([0, 0], [4, 2], samples, false).with_orders(COUNT);
             for (x, y) in (0..8).map(|i| (i % 4, i / 4)) {
                 for _ in 0..16 {
                     let mut layers = [Spectrum::ZERO; COUNT];
@@ -127,15 +178,15 @@ mod tests {
                 let at = [6.0 * s.uniform() - 1.0, 4.0 * s.uniform() - 1.0];
                 assert!(b.splats.add_order(at, Spectrum::splat(s.uniform()), k % 7));
             }
-            film.merge(b, &Filter::Tent(1.2));
+            film.merge(b, &Filter::Tent(1.2)).unwrap();
         }
         let orders = film.orders.as_ref().unwrap();
         for (i, p) in film.pixels.iter().enumerate() {
             for lane in 0..3 {
-                let sum: i128 = (0..COUNT).map(|k| orders.0.sum(i, k)[lane]).sum();
+                let sum: i128 = (0..COUNT).map(|k| orders.walks.sum(i, k)[lane]).sum();
                 assert_eq!(sum, p.sum[lane]);
-                let sum: i128 = (0..COUNT).map(|k| orders.1.sum(i, k)[lane]).sum();
-                assert_eq!(sum, film.splats.as_ref().unwrap().sum(i)[lane]);
+                let sum: i128 = (0..COUNT).map(|k| orders.splats.sum(i, k)[lane]).sum();
+                assert_eq!(sum, film.splats.as_ref().unwrap().sum[i][lane]);
                 let mean: f64 = (0..COUNT).map(|k| film.order(i, k)[lane]).sum();
                 let whole = film.estimate(i).mean[lane];
                 assert!((mean - whole).abs() < 1e-14 * whole.abs(), "{mean} {whole}");
