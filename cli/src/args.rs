@@ -2,10 +2,12 @@
 
 use crate::failure::{Outcome, input};
 use crate::values::{
-    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, positive, share,
+    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, layer,
+    positive, share,
 };
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use resolvent_engine::plugin::Registry;
+use resolvent_scene::Aov;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -98,14 +100,16 @@ pub struct Render {
     /// Render only this window; X1 and Y1 are outside of it
     #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Picture")]
     pub crop: Option<Window>,
-    /// Further layers of EXR files
+    /// Further layers of EXR files: depth, albedo, normal (of the first collision or surface), variance (of each pixel's mean),
+    /// samples, or orders:N (light scattered 0, 1, ... N times, and the rest: layers that sum to the picture)
     #[arg(
         long,
         value_name = "LAYER",
+        value_parser = layer,
         value_delimiter = ',',
         help_heading = "Picture"
     )]
-    pub aov: Vec<Layer>,
+    pub aov: Vec<Aov>,
     /// How PNG files are made
     #[command(flatten)]
     pub tone: Tone,
@@ -272,21 +276,6 @@ impl PluginPath {
             None => Ok(Registry::new(&self.plugin_path)),
         }
     }
-}
-
-/// Further layers.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub enum Layer {
-    /// Distance to the first collision or surface
-    Depth,
-    /// Albedo there
-    Albedo,
-    /// Normal there
-    Normal,
-    /// Variance of each pixel's mean
-    Variance,
-    /// Samples taken
-    Samples,
 }
 
 /// Curves of PNG files.

@@ -3,6 +3,8 @@
 //! The checker ([`crate::check`]) and the JSON Schema ([`crate::schema`]) are both driven by them, so that
 //! what the one accepts is what the other describes.
 
+use crate::describe::Aov;
+
 /// The format's version, the value of the key `resolvent`.
 pub const VERSION: u32 = 1;
 
@@ -108,8 +110,8 @@ pub(crate) enum Kind {
     Text,
     /// A text that is not empty: names and paths.
     Name,
-    /// A list of different names out of these.
-    Choices(&'static [&'static str]),
+    /// A list of different layers (see [`crate::Aov`]): these, and `orders:N` with N up to the number.
+    Layers(&'static [&'static str], u32),
     /// One name out of these.
     Choice(&'static [&'static str]),
     /// Three coordinates.
@@ -362,8 +364,11 @@ static FILM: Object = Object {
         ),
         may(
             "aovs",
-            Kind::Choices(&["depth", "albedo", "normal", "variance", "samples"]),
-            "Further layers",
+            Kind::Layers(
+                &["depth", "albedo", "normal", "variance", "samples"],
+                Aov::MOST_ORDERS,
+            ),
+            "Further layers; \"orders:N\": light scattered 0 to N times, and the rest, in layers that sum to the picture",
         ),
     ],
     rules: &[],

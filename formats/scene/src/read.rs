@@ -262,10 +262,9 @@ impl Reader<'_> {
         )?;
         let aovs = list(node, "aovs")
             .iter()
-            .filter_map(|n| {
-                Aov::ALL
-                    .into_iter()
-                    .find(|a| matches!(&n.data, Data::Text(t) if &**t == a.name()))
+            .filter_map(|n| match &n.data {
+                Data::Text(t) => Aov::parse(t),
+                _ => None,
             })
             .collect();
         Some(Film {

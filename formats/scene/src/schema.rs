@@ -74,8 +74,9 @@ impl Builder<'_> {
             }
             Kind::Text => json!({"type": "string"}),
             Kind::Name => json!({"type": "string", "minLength": 1}),
-            Kind::Choices(names) => {
-                json!({"type": "array", "items": {"enum": names}, "uniqueItems": true})
+            Kind::Layers(names, _) => {
+                let orders = json!({"type": "string", "pattern": "^orders:[0-9]{1,2}$"});
+                json!({"type": "array", "items": {"anyOf": [{"enum": names}, orders]}, "uniqueItems": true})
             }
             Kind::Choice(names) => json!({"enum": names}),
             Kind::Pair => numbers(2, COORDINATE),

@@ -221,7 +221,7 @@ fn film(f: &Film) -> Json {
         }
     };
     if !f.aovs.is_empty() {
-        out["aovs"] = f.aovs.iter().map(|a| a.name()).collect();
+        out["aovs"] = f.aovs.iter().map(|a| a.to_string()).collect();
     }
     out
 }

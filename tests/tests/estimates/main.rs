@@ -54,6 +54,7 @@ impl Shot {
             goal,
             seed,
             features: false,
+            orders: 0,
         };
         let (scene, stop) = (&self.scene, AtomicBool::new(false));
         render(scene, &self.integrator, &settings, &stop, &|_| {})

@@ -17,6 +17,8 @@ mod instances;
 mod lights;
 mod materials;
 mod nested;
+mod orders;
+mod peers;
 mod points;
 mod slab_flux;
 mod slab_radiance;

@@ -8,6 +8,7 @@ mod buffer;
 mod coverage;
 mod error;
 mod fixed;
+mod orders;
 mod splat;
 mod store;
 mod tile;
@@ -46,6 +47,8 @@ pub struct Film {
     tiles: Vec<TileSums>,
     /// Parts of nets, by tile and first sample of the net.
     parts: BTreeMap<(usize, u32), Part>,
+    /// Light by scattering order, if wanted.
+    orders: Option<orders::Orders>,
     /// Light from walks that started at lights, once there is any.
     splats: Option<splat::Sums>,
     /// Pieces of work merged, and their samples.
@@ -94,6 +97,7 @@ impl Film {
             },
             tiles: vec![TileSums::default(); tile::count(window)],
             parts: BTreeMap::new(),
+            orders: None,
             splats: None,
             pieces: (0, 0),
             twin: None,
@@ -106,6 +110,18 @@ impl Film {
             twin: Some(Box::new(Self::new(window, features))),
             ..Self::new(window, features)
         }
+    }
+
+    /// With `count` layers of light by scattering order, the last for all that was scattered more often; in all halves.
+    pub fn with_orders(mut self, count: usize) -> Self {
+        self.orders = (count > 0).then(|| orders::Orders::new(count, self.pixels.len()));
+        self.twin = self.twin.map(|t| Box::new(t.with_orders(count)));
+        self
+    }
+
+    /// Number of layers of light by scattering order.
+    pub fn orders(&self) -> usize {
+        self.orders.as_ref().map_or(0, |o| o.walks.count())
     }
 
     /// The first half, or the second.
@@ -193,7 +209,13 @@ impl Film {
             let sums = self
                 .splats
                 .get_or_insert_with(|| splat::Sums::new(self.pixels.len()));
-            part.splats = sums.add(&b.splats, self.window, filter, samples);
+            let orders = &mut self.orders;
+            let heard = |i, order, value| {
+                if let Some(orders) = orders {
+                    orders.splats.deposit(i, order, value);
+                }
+            };
+            part.splats = sums.add(&b.splats, self.window, filter, samples, heard);
             add(&mut self.tiles[tile].splats, part.splats);
         }
         self.pieces.0 += 1;
@@ -204,6 +226,9 @@ impl Film {
             q.alpha = q.alpha.wrapping_add(p.alpha);
             if let (Some(f), Some(g)) = (b.features.get(i), self.features.get_mut(at)) {
                 g.add(f);
+            }
+            if let (Some(f), Some(g)) = (&b.orders, &mut self.orders) {
+                g.walks.merge(at, f, i);
             }
         }
         self.complete(tile, net.start, part);
@@ -242,7 +267,8 @@ impl Film {
     /// # Errors
     /// If they are not parts of one picture, or have samples in common; then nothing is changed.
     pub fn join(&mut self, other: &Self) -> Result<(), String> {
-        if self.window != other.window || self.features.len() != other.features.len() {
+        let layers = |f: &Self| (f.features.len(), f.orders());
+        if self.window != other.window || layers(self) != layers(other) {
             return Err("they are not of one picture".into());
         }
         if self.twin.is_some() || other.twin.is_some() {
@@ -265,6 +291,9 @@ impl Film {
         }
         for (a, b) in self.features.iter_mut().zip(&other.features) {
             a.add(b);
+        }
+        if let (Some(a), Some(b)) = (&mut self.orders, &other.orders) {
+            a.join(b);
         }
         if let Some(splats) = &other.splats {
             self.splats
@@ -346,6 +375,23 @@ impl Film {
             samples,
             degrees: nets.saturating_sub(1),
         }
+    }
+
+    /// Mean radiance of layer `k` by scattering order at pixel `i`; zero if there are no layers.
+    pub fn order(&self, i: usize, k: usize) -> [f64; 3] {
+        let tile = tile::of_pixel(self.window, i);
+        // As the picture's: halves that have not begun do not count.
+        let begun = |h: &&Self| h.tiles[tile].samples() > 0;
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        for h in self.halves().filter(begun) {
+            let Some(orders) = &h.orders else { continue };
+            let n = f64::from(h.tiles[tile].samples());
+            let (a, b) = (orders.walks.sum(i, k), orders.splats.sum(i, k));
+            let m = h.pieces.1.max(1) as f64;
+            sum = [0, 1, 2].map(|lane| sum[lane] + float(a[lane]) / n + float(b[lane]) / m);
+            count += 1.0;
+        }
+        sum.map(|v| v / f64::max(count, 1.0))
     }
 
     /// The features of pixel `i`; zero if they were not asked for.
