@@ -339,7 +339,12 @@ pub struct Merge {
     #[arg(required = true, value_name = "CHECKPOINT")]
     pub checkpoints: Vec<PathBuf>,
     /// Picture to write, .exr or .png; may be given several times
-    #[arg(short, long, value_name = "FILE", required_unless_present = "checkpoint")]
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "checkpoint"
+    )]
     pub output: Vec<PathBuf>,
     /// Write the sums as a checkpoint
     #[arg(long, value_name = "FILE")]

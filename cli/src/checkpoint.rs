@@ -3,8 +3,8 @@
 use crate::args::{Aim, Render};
 use crate::console;
 use crate::failure::{Failure, Outcome, failed, input};
-use resolvent_engine::checkpoint::{Checkpoint, State, difference, fingerprint};
 use resolvent_engine::Rendered;
+use resolvent_engine::checkpoint::{Checkpoint, State, difference, fingerprint};
 use resolvent_engine::plugin::{ForeignIntegrator, Registry};
 use resolvent_scene as describe;
 use serde_json::{Map, Value, json};

@@ -6,8 +6,8 @@ use crate::console;
 use crate::failure::{Code, Outcome, input};
 use crate::output;
 use crate::stats::{self, About};
-use resolvent_engine::checkpoint::Checkpoint;
 use resolvent_engine::Rendered;
+use resolvent_engine::checkpoint::Checkpoint;
 use resolvent_scene::Scene;
 use std::path::Path;
 

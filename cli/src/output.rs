@@ -88,12 +88,7 @@ pub fn check_writable(path: &Path) -> Outcome<()> {
 
 /// Refuses a picture that memory cannot hold, before the system ends the program for it. `films` is how many times its sums are
 /// held.
-pub fn check_memory(
-    window: [u32; 4],
-    features: bool,
-    layers: usize,
-    films: usize,
-) -> Outcome<()> {
+pub fn check_memory(window: [u32; 4], features: bool, layers: usize, films: usize) -> Outcome<()> {
     let pixels = u64::from(window[2] - window[0]) * u64::from(window[3] - window[1]);
     let sums = size_of::<resolvent_engine::film::Pixel>()
         + usize::from(features) * size_of::<resolvent_engine::film::FeatureSums>();

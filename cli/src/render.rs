@@ -67,7 +67,14 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let layers = described.film.aovs.len();
     output::check_memory(described.film.window(), features, layers, films)?;
 
-    let rendered = render(&built, &integrator, &described, &plan, keeper.as_ref(), a.aim.every)?;
+    let rendered = render(
+        &built,
+        &integrator,
+        &described,
+        &plan,
+        keeper.as_ref(),
+        a.aim.every,
+    )?;
     interrupt::enter(Phase::Writing);
     let (rendered, broken) = match rendered {
         Ok(rendered) => (rendered, None),

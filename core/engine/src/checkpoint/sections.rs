@@ -82,7 +82,8 @@ impl<'a> Reader<'a> {
             let rest = f.0;
             let name = f.bytes(NAME)?;
             let name = name.split(|b| *b == 0).next().unwrap_or_default();
-            let name = std::str::from_utf8(name).map_err(|_| "is damaged: a section has no name")?;
+            let name =
+                std::str::from_utf8(name).map_err(|_| "is damaged: a section has no name")?;
             let length = usize::try_from(f.u64()?).unwrap_or(usize::MAX);
             let payload = f.bytes(length)?;
             checked(rest, &mut f, name)?;
@@ -106,7 +107,10 @@ impl<'a> Reader<'a> {
     /// # Errors
     /// If there is none, or it has another.
     pub fn take(&mut self, name: &str, length: Option<usize>) -> Result<Fields<'a>, String> {
-        let bytes = self.0.remove(name).ok_or(format!("has no section '{name}'"))?;
+        let bytes = self
+            .0
+            .remove(name)
+            .ok_or(format!("has no section '{name}'"))?;
         match length {
             Some(n) if n != bytes.len() => Err(format!(
                 "is damaged: section '{name}' has {} bytes instead of {n}",
@@ -151,10 +155,7 @@ impl<'a> Fields<'a> {
     /// # Errors
     /// If there are not so many left.
     pub fn bytes(&mut self, n: usize) -> Result<&'a [u8], String> {
-        let (head, tail) = self
-            .0
-            .split_at_checked(n)
-            .ok_or("is cut short")?;
+        let (head, tail) = self.0.split_at_checked(n).ok_or("is cut short")?;
         self.0 = tail;
         Ok(head)
     }

@@ -51,11 +51,17 @@ fn sample(adaptive: bool) -> Vec<u8> {
 fn mend(bytes: &mut [u8]) {
     let number = |b: &[u8], at: usize, n: usize| -> Option<usize> {
         let digits = b.get(at..at + n)?;
-        Some(digits.iter().rev().fold(0usize, |v, d| v.wrapping_mul(256).wrapping_add(*d as usize)))
+        Some(
+            digits
+                .iter()
+                .rev()
+                .fold(0usize, |v, d| v.wrapping_mul(256).wrapping_add(*d as usize)),
+        )
     };
     let put = |b: &mut [u8], from: usize, at: usize| -> Option<()> {
         let sum = crc32fast::hash(b.get(from..at)?);
-        b.get_mut(at..at.checked_add(4)?)?.copy_from_slice(&sum.to_le_bytes());
+        b.get_mut(at..at.checked_add(4)?)?
+            .copy_from_slice(&sum.to_le_bytes());
         Some(())
     };
     let mut at = 0;
@@ -101,7 +107,11 @@ fn damage_is_an_error() {
             let mut bad = good.clone();
             for _ in 0..1 + below(3) {
                 // Half of the damage hits the first bytes, where lengths and the header are.
-                let reach = if below(2) == 0 { bad.len() } else { bad.len().min(900) };
+                let reach = if below(2) == 0 {
+                    bad.len()
+                } else {
+                    bad.len().min(900)
+                };
                 let at = below(reach);
                 match below(5) {
                     0 => bad[at] ^= 1 << below(8),
@@ -153,5 +163,8 @@ fn what_is_foreign_is_told_apart() {
     Film::new([0, 0, 1, 1], false).write("", &mut out);
     out.section("orders", |out| out.push(1));
     let text = why(&out.finish());
-    assert!(text.contains("'orders'") && text.contains("use the program"), "{text}");
+    assert!(
+        text.contains("'orders'") && text.contains("use the program"),
+        "{text}"
+    );
 }

@@ -130,7 +130,11 @@ mod tests {
                     }
                     Err(both) => {
                         assert!(r.start <= both.start && both.end <= r.end && !both.is_empty());
-                        assert!(flags[both.start as usize..both.end as usize].iter().all(|f| *f));
+                        assert!(
+                            flags[both.start as usize..both.end as usize]
+                                .iter()
+                                .all(|f| *f)
+                        );
                     }
                 }
             }

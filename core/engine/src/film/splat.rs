@@ -114,7 +114,11 @@ impl Sums {
     }
 
     /// Mean of pixel `i` after some pieces with so many samples together, and its variance, if there were two.
-    pub fn estimate(&self, i: usize, (pieces, samples): (u64, u64)) -> ([f64; 3], Option<[f64; 3]>) {
+    pub fn estimate(
+        &self,
+        i: usize,
+        (pieces, samples): (u64, u64),
+    ) -> ([f64; 3], Option<[f64; 3]>) {
         let n = samples.max(1) as f64;
         let mean = self.sum[i].map(|s| float(s) / n);
         let variance = (pieces >= 2).then(|| {

@@ -177,7 +177,9 @@ impl Film {
                 nets::around(net).len() as u32 - missing.iter().map(|r| r.len() as u32).sum::<u32>()
             };
             if !wanted.remove(&(tile, net)) || covered(self.tiles[tile].coverage()) != samples {
-                return Err(format!("tile {tile} cannot have a part of the net from sample {net}"));
+                return Err(format!(
+                    "tile {tile} cannot have a part of the net from sample {net}"
+                ));
             }
             let splats = f.three()?;
             let pixels = (0..tile::rect(self.window, tile).pixels())
