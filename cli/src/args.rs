@@ -39,6 +39,9 @@ pub enum Command {
     Compare(Compare),
     /// Merge checkpoints of disjoint sample ranges into one picture
     Merge(Merge),
+    /// Measure time against error on the benchmark scenes
+    #[cfg(feature = "bench")]
+    Bench(Box<resolvent_bench::Options>),
     /// List plugins, or describe one
     Plugin(Plugin),
     /// Print the JSON Schema of scene files, with the parameters of all plugins found

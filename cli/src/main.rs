@@ -4,6 +4,8 @@
 //! usage, input or plugin, 3 interrupted with the finished part saved.
 
 mod args;
+#[cfg(feature = "bench")]
+mod bench;
 mod checkpoint;
 mod compare;
 mod console;
@@ -44,6 +46,8 @@ fn main() -> ExitCode {
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
         args::Command::Merge(a) => merge::run(&a),
+        #[cfg(feature = "bench")]
+        args::Command::Bench(a) => bench::run(&a),
         args::Command::Plugin(a) => plugin::run(&a),
         args::Command::Schema(a) => plugin::schema(&a),
     });

@@ -67,6 +67,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let layers = described.film.aovs.len();
     output::check_memory(described.film.window(), features, layers, films)?;
 
+    let cpu = crate::system::cpu_seconds().unwrap_or(0.0);
     let rendered = render(
         &built,
         &integrator,
@@ -75,6 +76,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         keeper.as_ref(),
         a.aim.every,
     )?;
+    seconds.render_cpu = crate::system::cpu_seconds().unwrap_or(0.0) - cpu;
     interrupt::enter(Phase::Writing);
     let (rendered, broken) = match rendered {
         Ok(rendered) => (rendered, None),

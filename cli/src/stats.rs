@@ -31,6 +31,8 @@ pub struct Seconds {
     pub write: f64,
     /// Everything.
     pub total: f64,
+    /// CPU seconds of all threads while rendering; 0 where the system does not say.
+    pub render_cpu: f64,
 }
 
 impl Seconds {
@@ -267,6 +269,10 @@ fn figures(run: &Run) -> Value {
             "render": s.render,
             "write": s.write,
             "total": s.total,
+        },
+        "cpu_seconds": {
+            "render": s.render_cpu,
+            "total": crate::system::cpu_seconds(),
         },
         "peak_memory_bytes": crate::system::peak_memory(),
         "threads": rayon::current_num_threads(),

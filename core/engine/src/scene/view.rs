@@ -7,7 +7,7 @@ use resolvent_api::abi::{SceneTable, Status, Text, scene_traits};
 use resolvent_api::math::Float3;
 use resolvent_api::operator::FlightDraws;
 use resolvent_api::vertex::{
-    CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex, vertex_flags,
+    CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex, WITH_MEDIA, vertex_flags,
 };
 use resolvent_api::{Spectrum, Vec3};
 use std::cell::{Cell, RefCell};
@@ -158,6 +158,7 @@ impl<'s> View<'s> {
         let single = self.scene.media.len() == 1 && self.scene.media[0].free;
         let (emerge, propagate, connect) =
             match (has(scene_traits::SURFACES), has(scene_traits::MEDIA)) {
+                _ if !WITH_MEDIA => functions::<true, { media::NONE }>(),
                 (true, false) => functions::<true, { media::NONE }>(),
                 (true, true) if self.scene.fades => functions::<true, { media::FADING }>(),
                 (true, true) if single => functions::<true, { media::ONE }>(),
@@ -391,7 +392,8 @@ unsafe extern "C" fn emit(
         Some(mut ray) => {
             // Lights at infinity stand outside everything.
             if !vertex.is_infinite() {
-                ray.inside = scene.interiors_at(ray.o.into());
+                let start = scene.starts.get(vertex.light as usize).copied().flatten();
+                ray.inside = start.unwrap_or_else(|| scene.interiors_at(ray.o.into()));
             }
             // SAFETY: as above.
             unsafe { *out = ray };
