@@ -302,7 +302,7 @@ pub enum Budget {
     Spp(u64),
     /// After so many seconds, > 0.
     Time(f64),
-    /// When the estimated relative error of the picture is at most this, > 0.
+    /// When the estimated relative error of every tile of the picture is at most this, > 0.
     Error(f64),
 }
 

@@ -409,7 +409,7 @@ static SAMPLING: Object = Object {
         may(
             "error",
             Kind::Number(Range::above(0.0, 1e3)),
-            "Estimated relative error to reach",
+            "Estimated relative error that no tile of the picture shall exceed",
         ),
         may(
             "seed",
