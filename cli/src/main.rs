@@ -18,6 +18,7 @@ mod progress;
 mod render;
 mod stats;
 mod system;
+mod usd;
 mod values;
 mod volume;
 
@@ -39,6 +40,7 @@ fn main() -> ExitCode {
     let args = args::Args::parse();
     let outcome = std::panic::catch_unwind(|| match args.command {
         args::Command::Render(a) => render::run(&a),
+        args::Command::Convert(a) => usd::run(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
         args::Command::Plugin(a) => plugin::run(&a),

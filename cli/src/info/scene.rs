@@ -45,9 +45,14 @@ pub fn report(path: &Path) -> Outcome<Report> {
         row(
             "prototype",
             format!(
-                "{name} ({}), {} instances",
+                "{name} ({}), {} instances{}",
                 counted(&shapes),
-                copies.count()
+                copies.clone().count(),
+                if copies.clone().any(|i| i.transforms.is_some()) {
+                    " (tables count as one)"
+                } else {
+                    ""
+                }
             ),
         );
     }
@@ -190,7 +195,9 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
         }
     }
     for t in scene.textures.values() {
-        if let ImageSource::File(file) = &t.image {
+        if let ImageSource::File(file) = &t.image
+            && !file.contains("<UDIM>")
+        {
             add(file);
         }
     }

@@ -25,7 +25,7 @@ pub const MAGIC: [u8; 8] = *b"RESOLVNT";
 /// Versions must agree exactly.
 pub const ABI_MAJOR: u32 = 1;
 /// The host accepts plugins of any minor version; it reads only what a table's size says is there.
-pub const ABI_MINOR: u32 = 1;
+pub const ABI_MINOR: u32 = 2;
 /// Name of the exported `static` [`PluginHeader`].
 pub const SYMBOL: &str = "resolvent_plugin";
 
@@ -537,6 +537,14 @@ pub struct SceneTable {
         light: *const Vertex,
         to: *const Vertex,
         out: *mut [f32; 2],
+    ) -> Status,
+    /// Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
+    /// lights that no ray can meet.
+    pub radiance: unsafe extern "C" fn(
+        ctx: *const c_void,
+        light: *const Vertex,
+        to: *const Vertex,
+        out: *mut Spectrum,
     ) -> Status,
 }
 

@@ -104,7 +104,7 @@ pub fn render(
 ) -> std::result::Result<Rendered, Box<Broken>> {
     let start = Instant::now();
     let work = Mutex::new(Work {
-        film: Film::new(settings.window, settings.features),
+        film: Film::new(settings.window, settings.features).exposed(scene.camera.exposure()),
         counters: Counters::default(),
         rejected_at: None,
         error: None,

@@ -11,4 +11,5 @@ mod render;
 mod stats;
 mod textures;
 mod tools;
+mod usd;
 mod volume;

@@ -198,6 +198,8 @@ pub struct Film {
     splats: Option<splat::Sums>,
     /// Pieces of work merged, and their samples.
     pieces: (u64, u64),
+    /// Factor on the picture: the camera's exposure.
+    exposure: f64,
 }
 
 /// One pixel's estimates.
@@ -238,7 +240,13 @@ impl Film {
             },
             splats: None,
             pieces: (0, 0),
+            exposure: 1.0,
         }
+    }
+
+    /// The film with a factor on its picture.
+    pub fn exposed(self, exposure: f64) -> Self {
+        Self { exposure, ..self }
     }
 
     /// Width and height of the window.
@@ -315,9 +323,10 @@ impl Film {
             // A pixel's own samples and what falls on it from all others' are all but independent.
             variance = variance.zip(v).map(|(a, b)| [0, 1, 2].map(|k| a[k] + b[k]));
         }
+        let e = self.exposure;
         Estimate {
-            mean,
-            variance,
+            mean: mean.map(|m| m * e),
+            variance: variance.map(|v| v.map(|v| v * e * e)),
             alpha: float(p.alpha) / n,
             samples: p.samples,
         }
@@ -428,5 +437,9 @@ mod tests {
         film.merge(b, &Filter::Box(0.5));
         assert_eq!(film.estimate(0).samples, 3);
         assert!((film.estimate(0).mean[0] - 1.0 / 3.0).abs() < 1e-12);
+        let (dark, film) = (film.estimate(0), film.exposed(4.0));
+        assert!((film.estimate(0).mean[0] - 4.0 / 3.0).abs() < 1e-12);
+        let variance = |e: Estimate| e.variance.map(|v| v[0]);
+        assert_eq!(variance(film.estimate(0)), variance(dark).map(|v| 16.0 * v));
     }
 }

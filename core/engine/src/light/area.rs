@@ -1,6 +1,6 @@
 //! Emitting shapes.
 
-use super::{Distribution, per_solid_angle};
+use super::{Distribution, Shaping, per_solid_angle};
 use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh};
 use crate::texture::Binding;
 use resolvent_api::Spectrum;
@@ -25,6 +25,8 @@ pub struct Area {
     /// What the radiance is multiplied with over the surface, and its mean; for meshes and parallelograms. Points are chosen
     /// without regard to it.
     texture: Option<(Binding, Spectrum)>,
+    /// What the radiance is multiplied with by direction, and its mean.
+    shaping: Option<Box<(Shaping, Spectrum)>>,
 }
 
 /// A point on an emitting shape.
@@ -80,6 +82,7 @@ impl Area {
             area,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -94,6 +97,7 @@ impl Area {
             area,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -107,6 +111,7 @@ impl Area {
             area: PI * disk.radius * disk.radius,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -122,6 +127,7 @@ impl Area {
             area: (2.0 * std::f64::consts::PI * f64::from(cylinder.radius) * length) as f32,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -145,6 +151,7 @@ impl Area {
             area,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -163,9 +170,35 @@ impl Area {
         self
     }
 
-    /// Emitted radiance at texture coordinates.
+    /// The same with its radiance multiplied by a factor that depends on direction.
+    pub fn shaped(mut self, shaping: Option<Shaping>) -> Self {
+        self.shaping = shaping.map(|s| {
+            let normal = match &self.form {
+                AreaShape::Quad(q) => q.edge_u.cross(q.edge_v).try_normalize(),
+                AreaShape::Disk(d, _) => Some(d.normal),
+                _ => None,
+            };
+            let mean = match normal {
+                Some(n) if self.two_sided => (s.mean(Some(n)) + s.mean(Some(-n))) * 0.5,
+                normal => s.mean(normal),
+            };
+            Box::new((s, mean))
+        });
+        self
+    }
+
+    /// Emitted radiance at texture coordinates in the unit direction `w`, away from the surface.
     #[inline]
-    pub fn radiance_at(&self, uv: [f32; 2]) -> Spectrum {
+    pub fn radiance_towards(&self, uv: [f32; 2], w: Vec3) -> Spectrum {
+        match &self.shaping {
+            None => self.radiance_at(uv),
+            Some(shaping) => self.radiance_at(uv) * shaping.0.factor(w),
+        }
+    }
+
+    /// Emitted radiance at texture coordinates, where no direction is favoured.
+    #[inline]
+    fn radiance_at(&self, uv: [f32; 2]) -> Spectrum {
         match &self.texture {
             None => self.radiance,
             Some((texture, _)) => {
@@ -175,12 +208,17 @@ impl Area {
         }
     }
 
-    /// Radiant power, W; of textured ones approximately, by the mean of the whole image.
+    /// Radiant power, W; of textured ones approximately, by the mean of the whole image, and of cylinders and meshes that favour
+    /// directions as if their normals were spread evenly.
     pub fn power(&self, lanes: u32) -> f32 {
         let sides = if self.two_sided { 2.0 } else { 1.0 };
         let radiance = match &self.texture {
             None => self.radiance,
             Some((_, mean)) => self.radiance * *mean,
+        };
+        let radiance = match &self.shaping {
+            None => radiance,
+            Some(shaping) => radiance * shaping.1,
         };
         sides * PI * self.area * radiance.mean(lanes)
     }
@@ -264,10 +302,11 @@ impl Area {
         if !(shows && distance > 0.0 && density > 0.0 && density.is_finite()) {
             return None;
         }
+        let wi = d / distance;
         Some(LightSample {
-            wi: (d / distance).into(),
+            wi: wi.into(),
             distance,
-            radiance: self.radiance_at(at.uv),
+            radiance: self.radiance_towards(at.uv, -wi),
             density,
             light: NONE,
             flags: 0,

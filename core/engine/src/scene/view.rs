@@ -139,6 +139,7 @@ impl<'s> View<'s> {
             sense,
             emit,
             emission_density,
+            radiance,
         }
     }
 }
@@ -361,6 +362,17 @@ unsafe extern "C" fn emission_density(
 ) -> Status {
     // SAFETY: as above.
     unsafe { *out = view(ctx).scene.lights.emission_density(&*light, &*to) };
+    Status::OK
+}
+
+unsafe extern "C" fn radiance(
+    ctx: *const c_void,
+    light: *const Vertex,
+    to: *const Vertex,
+    out: *mut Spectrum,
+) -> Status {
+    // SAFETY: as above.
+    unsafe { *out = view(ctx).scene.lights.radiance(&*light, &*to) };
     Status::OK
 }
 

@@ -27,7 +27,12 @@ pub struct Texture {
     bias: [f32; 3],
     /// Rows of the map from the surface's coordinates to the image's.
     uv: [[f32; 3]; 2],
+    /// Tiles by column + 10 row, in place of `texels`.
+    tiles: Option<Box<[Option<Texture>]>>,
 }
+
+/// Columns of tiles.
+pub(super) const COLUMNS: usize = 10;
 
 impl Texture {
     /// The image `texels` with the settings of `t`.
@@ -57,6 +62,27 @@ impl Texture {
             scale: t.scale.map(|v| v as f32),
             bias: t.bias.map(|v| v as f32),
             uv: t.uv.rows().map(|row| row.map(|v| v as f32)),
+            tiles: None,
+        }
+    }
+
+    /// Tiles by column + 10 row, with the settings of `t`.
+    pub fn tiled(tiles: Vec<Option<Arc<Texels>>>, t: &describe::Texture) -> Self {
+        let settings = describe::Texture {
+            uv: describe::UvTransform::default(),
+            wrap: [Wrap::Clamp; 2],
+            ..t.clone()
+        };
+        let nothing = Texels {
+            width: 1,
+            height: 1,
+            channels: 4,
+            data: TexelData::U8(vec![0; 4]),
+        };
+        let tile = |texels: Option<Arc<Texels>>| texels.map(|x| Self::new(x, &settings));
+        Self {
+            tiles: Some(tiles.into_iter().map(tile).collect()),
+            ..Self::new(Arc::new(nothing), t)
         }
     }
 
@@ -64,6 +90,9 @@ impl Texture {
     #[inline]
     pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
         let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+        if let Some(tiles) = &self.tiles {
+            return self.tile(tiles, x, y);
+        }
         // The image's rows go down, its coordinates up.
         let (x, y) = (self.along(0, x), self.along(1, 1.0 - y));
         let v = if self.nearest {
@@ -79,9 +108,28 @@ impl Texture {
         self.finish(v)
     }
 
+    /// The value on the tile that lies under (x, y).
+    fn tile(&self, tiles: &[Option<Texture>], x: f32, y: f32) -> [f32; 4] {
+        let (column, row) = (x.floor(), y.floor());
+        let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
+        let index = row as usize * COLUMNS + column as usize;
+        match tiles.get(index) {
+            Some(Some(tile)) if lies => tile.at([x - column, y - row]),
+            _ => self.finish([0.0; 4]),
+        }
+    }
+
     /// Mean over the texels of red, green, blue and alpha after `bound`.
-    pub fn mean(&self, bound: impl Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
+    pub fn mean(&self, bound: &dyn Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
         let mut sum = [0f64; 4];
+        if let Some(tiles) = &self.tiles {
+            let n = tiles.iter().flatten().count().max(1) as f64;
+            for tile in tiles.iter().flatten() {
+                let v = tile.mean(bound);
+                (0..4).for_each(|i| sum[i] += f64::from(v[i]) / n);
+            }
+            return sum.map(|v| v as f32);
+        }
         for y in 0..self.texels.height {
             for x in 0..self.texels.width {
                 let v = bound(self.finish(self.texel(x, y)));
@@ -112,10 +160,18 @@ impl Texture {
         Along::new(coordinate, size, self.wrap[axis])
     }
 
-    /// The texel in column `x` of row `y`, decoded.
+    /// The texel in column `x` of row `y`, decoded; both lie in the image.
+    pub fn decoded(&self, x: usize, y: usize) -> [f32; 4] {
+        self.texel(x, y)
+    }
+
+    /// The texel in column `x` of row `y`, decoded; nothing outside of the image.
     #[inline(always)]
     fn texel(&self, x: usize, y: usize) -> [f32; 4] {
         let t = &*self.texels;
+        if x >= t.width || y >= t.height {
+            return [0.0; 4];
+        }
         let first = (y * t.width + x) * t.channels;
         let range = first..first + t.channels;
         match &t.data {
@@ -166,6 +222,9 @@ fn spread<C>(channels: &[C], color: impl Fn(&C) -> f32, alpha: impl Fn(&C) -> f3
     }
 }
 
+/// An index beyond every image.
+const OUTSIDE: usize = usize::MAX;
+
 /// A position along one axis of an image, wrapped: in texels from the first one's outer edge.
 #[derive(Clone, Copy)]
 struct Along {
@@ -186,6 +245,8 @@ impl Along {
         let unit = match wrap {
             Wrap::Repeat => c - c.floor(),
             Wrap::Clamp => c.clamp(0.0, 1.0),
+            // Further out there is no more than one image away.
+            Wrap::Black => c.clamp(-1.0, 2.0),
             Wrap::Mirror => {
                 let period = c - 2.0 * (0.5 * c).floor();
                 if period > 1.0 { 2.0 - period } else { period }
@@ -201,6 +262,9 @@ impl Along {
     /// The texel whose square it lies in.
     #[inline(always)]
     fn nearest(&self) -> usize {
+        if self.wrap == Wrap::Black && !(0.0..=self.size as f32).contains(&self.position) {
+            return OUTSIDE;
+        }
         // c − ⌊c⌋ rounds to 1 just below an integer: that is the last texel.
         (self.position as usize).min(self.size - 1)
     }
@@ -211,11 +275,15 @@ impl Along {
         let from_middle = self.position - 0.5;
         let low = from_middle.floor();
         let weight = from_middle - low;
+        if self.wrap == Wrap::Black {
+            let place = |i: f32| if i < 0.0 { OUTSIDE } else { i as usize };
+            return (place(low), place(low + 1.0), weight);
+        }
         // At most half a texel beyond either edge.
         let last = self.size - 1;
         let beyond = match self.wrap {
             Wrap::Repeat => (last, 0),
-            Wrap::Clamp | Wrap::Mirror => (0, last),
+            Wrap::Clamp | Wrap::Mirror | Wrap::Black => (0, last),
         };
         let first = if low < 0.0 {
             beyond.0
@@ -300,6 +368,13 @@ mod tests {
         assert_eq!(at(Wrap::Clamp, 1.0), 8.0);
         assert_eq!(at(Wrap::Mirror, 0.0), 1.0);
         assert_eq!(at(Wrap::Mirror, 1.0), 8.0);
+        // Black: halfway between the last middle and nothing, and nothing beyond.
+        assert_eq!(at(Wrap::Black, 0.0), 0.5);
+        assert_eq!(at(Wrap::Black, 1.0), 4.0);
+        assert_eq!(at(Wrap::Black, 0.375), 2.0);
+        for u in [-1e9, -2.0, -0.13, 1.13, 2.5, 1e9] {
+            assert_eq!(at(Wrap::Black, u), 0.0, "{u}");
+        }
         for i in -3i16..=3 {
             for (x, value) in row.iter().enumerate() {
                 let u = f32::from(i) + (x as f32 + 0.5) / 4.0;
@@ -314,12 +389,53 @@ mod tests {
                 assert_eq!(at(Wrap::Clamp, u), clamped, "{u}");
             }
         }
+        let sharp = grey(4, &row, |t| {
+            t.wrap[0] = Wrap::Black;
+            t.filter = TextureFilter::Nearest;
+        });
+        for (u, expected) in [(-0.01, 0.0), (0.0, 1.0), (0.99, 8.0), (1.01, 0.0)] {
+            assert_eq!(red(&sharp, u, 0.5), expected, "{u}");
+        }
         // Just below an integer, where u − ⌊u⌋ rounds to 1, and numbers that are none.
         let below = grey(4, &row, |t| t.filter = TextureFilter::Nearest);
         assert_eq!(red(&below, -1e-12, 0.5), 8.0);
         for odd in [f32::NAN, f32::INFINITY, f32::MIN, 1e30] {
             assert!(red(&below, odd, odd) >= 1.0);
         }
+    }
+
+    /// Tiles show their own square, upright, and nothing where there is none; factor and offset apply everywhere.
+    #[test]
+    fn tiles() {
+        let tile = |v: [f32; 2]| {
+            Some(Arc::new(Texels {
+                width: 1,
+                height: 2,
+                channels: 1,
+                data: TexelData::F32(v.to_vec()),
+            }))
+        };
+        let mut all = vec![None; 12];
+        (all[0], all[9], all[11]) = (tile([1.0, 2.0]), tile([3.0, 3.0]), tile([4.0, 5.0]));
+        let mut t = described();
+        t.scale = [2.0; 3];
+        t.bias = [0.5; 3];
+        let tiled = Texture::tiled(all, &t);
+        for (u, v, expected) in [
+            (0.5, 0.9, 1.0),
+            (0.5, 0.1, 2.0),
+            (9.5, 0.5, 3.0),
+            (1.2, 1.8, 4.0),
+            (1.2, 1.2, 5.0),
+            (0.5, 1.5, 0.0),
+            (-0.5, 0.5, 0.0),
+            (10.5, 0.5, 0.0),
+            (0.5, 1e20, 0.0),
+            (f32::NAN, 0.5, 0.0),
+        ] {
+            assert_eq!(red(&tiled, u, v), 2.0 * expected + 0.5, "({u}, {v})");
+        }
+        assert_eq!(tiled.mean(&|v| v)[0], 2.0 * 3.0 + 0.5);
     }
 
     #[test]
@@ -394,7 +510,7 @@ mod tests {
         t.bias = [0.0, 1.0, 0.125];
         let grey = Texture::new(texels.clone(), &t);
         assert_eq!(grey.at([0.25, 0.0]), [0.5, 0.75, 0.125, 0.5]);
-        assert_eq!(grey.mean(|v| v), [1.0, 0.5, 0.125, 0.75]);
+        assert_eq!(grey.mean(&|v| v), [1.0, 0.5, 0.125, 0.75]);
         t.channel = Some(TextureChannel::Alpha);
         let alpha = Texture::new(texels, &t);
         assert_eq!(alpha.at([0.25, 0.0]), [1.0, 0.5, 0.125, 0.5]);

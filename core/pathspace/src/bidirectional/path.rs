@@ -67,7 +67,11 @@ impl Path {
     pub fn contribution(&self, scene: &SceneView<'_>) -> Outcome<[f64; 4]> {
         let n = self.edges.len();
         let light = &self.vertices[0];
-        let mut f = light.emitted.0.map(f64::from);
+        let shown = match light.is(VertexKind::Surface) {
+            true => scene.radiance(light, &self.vertices[1])?,
+            false => light.emitted,
+        };
+        let mut f = shown.0.map(f64::from);
         let mut scale = self.importance;
         if !light.is_infinite() {
             scale *= f64::from(light.cosine(self.direction(0)));
