@@ -4,7 +4,7 @@ use crate::abi::{OutputTable, PixelSample, SceneTable, Status, Text, Tile, scene
 use crate::math::Vec3;
 use crate::operator::FlightDraws;
 use crate::spectrum::Spectrum;
-use crate::vertex::{CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex};
+use crate::vertex::{CameraRay, Edge, LightRay, LightSample, SensorSample, Vertex, WITH_MEDIA};
 
 /// A host call failed (a plugin broke, or the render was stopped); return it at once.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +61,9 @@ impl<'a> SceneView<'a> {
     /// True if the scene has all of these [`scene_traits`].
     #[inline(always)]
     pub fn has(&self, traits: u32) -> bool {
-        self.table.traits & traits == traits
+        let media =
+            scene_traits::MEDIA | scene_traits::EMISSIVE_MEDIA | scene_traits::CHROMATIC_MEDIA;
+        self.table.traits & traits == traits && (WITH_MEDIA || traits & media == 0)
     }
 
     /// True if a grey kernel is enough: no medium tells lanes apart.

@@ -21,7 +21,7 @@ pub struct Camera {
     parallel: bool,
     lens_radius: f32,
     focus_distance: f32,
-    exposure: f64,
+    exposure: f32,
     filter: Filter,
     /// The interior media the camera is in.
     pub inside: u64,
@@ -51,7 +51,7 @@ impl Camera {
             parallel,
             lens_radius: if parallel { 0.0 } else { c.lens_radius as f32 },
             focus_distance: c.focus_distance as f32,
-            exposure: c.exposure.exp2(),
+            exposure: c.exposure.exp2() as f32,
             filter: Filter::new(film.filter),
             inside: 0,
         }
@@ -63,7 +63,7 @@ impl Camera {
     }
 
     /// The factor on the picture.
-    pub fn exposure(&self) -> f64 {
+    pub fn exposure(&self) -> f32 {
         self.exposure
     }
 

@@ -6,7 +6,7 @@
 //!
 //!   ⟨I⟩ = f_λ / mean over λ' of Σ_techniques p_λ'
 
-use resolvent_api::vertex::Edge;
+use resolvent_api::vertex::{Edge, WITH_MEDIA};
 use resolvent_api::{Flight, Spectrum};
 
 /// Contribution and density of a path so far, lane by lane, sharing one arbitrary scale.
@@ -78,6 +78,9 @@ impl Throughput {
     /// connecting would have found it with `other` times that density: f·value / mean(p·(track + other·ratio)).
     #[inline(always)]
     pub fn found<const CHROMATIC: bool>(&self, edge: &Edge, other: f32, lanes: u32) -> Spectrum {
+        if !WITH_MEDIA {
+            return self.f * (1.0 / (1.0 + other));
+        }
         if CHROMATIC {
             let density = self.p * (edge.track + edge.ratio * other);
             self.f * edge.value / density.mean(lanes)
@@ -101,6 +104,9 @@ impl Throughput {
         other: f32,
         lanes: u32,
     ) -> Spectrum {
+        if !WITH_MEDIA {
+            return self.f * (1.0 / (density + other));
+        }
         if CHROMATIC {
             let total = self.p * (edge.ratio * density + edge.track * other);
             let mean = total.mean(lanes);

@@ -1,18 +1,14 @@
 //! The primary samples of a path: Owen-scrambled Sobol' for the first bounces, hashed numbers beyond.
 //!
-//! Samples come in randomised nets of `sobol::NET`, which are independent of each other. Every aligned batch of
-//! [`BATCH`] of them is a net too, and the spread of batches is what errors are estimated from: as if they were independent. In
-//! fact they complement each other, and the mean of many is better than that: the estimate errs on the safe side (measured on
-//! bench/surface_only: 1.3 times the variance at 32 samples, 1.6 times at 256; on bench/box_fog 1.0). Every number is a function of (seed, pixel, sample, bounce, purpose) alone.
+//! Samples come in [`nets`] that are scrambled independently of each other: the spread of nets is what errors are estimated from.
+//! Every number is a function of (seed, pixel, sample, bounce, purpose) alone.
 //!
 //! A direction and the point on a light that is connected to where it leads share one four-dimensional net: together they are
 //! the integral that a bounce adds.
 
-use crate::sobol::{self, NET};
+use crate::{nets, sobol};
 use resolvent_api::rng::{derive, mix, unit};
 use resolvent_api::{FlightDraws, ScatterDraws, Spectrum};
-
-pub use crate::sobol::BATCH;
 
 /// Bounces whose decisions use the net. Later ones gain nothing from it (their integrand has too many dimensions).
 const NET_BOUNCES: u32 = 2;
@@ -54,14 +50,16 @@ impl Sampler {
     #[inline(always)]
     pub fn new(seed: u64, pixel: u64, sample: u32, lanes: u32) -> Self {
         let pixel_key = derive(mix(seed ^ 0x5eed), pixel);
-        let net_key = derive(pixel_key, u64::from(sample / NET));
-        let sample_key = derive(net_key, 0x1_0000 + u64::from(sample % NET));
-        // One lane after the other from a random start: within a batch every lane leads about equally often.
-        let hero = (((net_key >> 40) as u32).wrapping_add(sample % NET)) % lanes;
+        let begin = nets::around(sample).start;
+        let index = sample - begin;
+        let net_key = derive(pixel_key, u64::from(begin));
+        let sample_key = derive(net_key, 0x1_0000 + u64::from(index));
+        // One lane after the other from a random start: within a net every lane leads about equally often.
+        let hero = (((net_key >> 40) as u32).wrapping_add(index)) % lanes;
         Self {
             net_key,
             sample_key,
-            index: sample % NET,
+            index,
             lanes,
             hero,
             flights: true,

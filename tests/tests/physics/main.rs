@@ -10,6 +10,7 @@
 mod agreement;
 mod harness;
 mod judge;
+mod report;
 mod scenes;
 
 mod instances;
@@ -19,9 +20,12 @@ mod nested;
 mod points;
 mod slab_flux;
 mod slab_radiance;
+mod soak;
 mod strategies;
+mod stress_index;
 mod stress_media;
 mod stress_places;
+mod stress_rest;
 mod stress_world;
 mod surfaces;
 mod transmittance;
