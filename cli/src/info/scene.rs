@@ -9,6 +9,7 @@ use resolvent_scene::{
     Value,
 };
 use serde_json::json;
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -183,9 +184,10 @@ fn plugins(scene: &Scene, registry: &Registry) -> Vec<Named> {
 /// The files that the scene names, as paths from the current folder, each once.
 pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
     let mut out = Vec::new();
+    let mut known = HashSet::new();
     let mut add = |file: &str| {
         let path = scene.resolve(file);
-        if !out.contains(&path) {
+        if known.insert(path.clone()) {
             out.push(path);
         }
     };
@@ -203,6 +205,11 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
     }
     for s in scene.all_shapes() {
         if let Geometry::Ply { file, .. } | Geometry::Gltf { file, .. } = &s.geometry {
+            add(file);
+        }
+    }
+    for i in &scene.instances {
+        if let Some(file) = &i.transforms {
             add(file);
         }
     }

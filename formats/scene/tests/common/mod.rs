@@ -13,9 +13,9 @@ pub const FULL: &str = r#"{
     "fov_x_deg": 44, "lens_radius": 0.05, "focus_distance": 9.5, "shift": [0.25, -0.1], "exposure": -1.5
   },
   "film": {
-    "resolution": [320, 200], "pixel_aspect": 1.5, "crop": [10, 20, 300, 180],
+    "resolution": [320, 200], "crop": [10, 20, 300, 180],
     "filter": {"type": "gaussian", "radius": 2, "sigma": 0.6},
-    "aovs": ["depth", "albedo", "normal", "variance", "samples"]
+    "aovs": ["depth", "albedo", "normal", "variance", "samples"], "pixel_aspect": 1.5
   },
   "sampling": {"spp": 128, "seed": 18446744073709551615},
   "integrator": {"plugin": "pt", "params": {"max_depth": 12}},
