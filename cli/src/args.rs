@@ -2,10 +2,12 @@
 
 use crate::failure::{Outcome, input};
 use crate::values::{
-    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, positive, share,
+    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, layer,
+    positive, share,
 };
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use resolvent_engine::plugin::Registry;
+use resolvent_scene::Aov;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -37,6 +39,11 @@ pub enum Command {
     Info(Info),
     /// Compare an image with a reference
     Compare(Compare),
+    /// Merge checkpoints of disjoint sample ranges into one picture
+    Merge(Merge),
+    /// Measure time against error on the benchmark scenes
+    #[cfg(feature = "bench")]
+    Bench(Box<resolvent_bench::Options>),
     /// List plugins, or describe one
     Plugin(Plugin),
     /// Print the JSON Schema of scene files, with the parameters of all plugins found
@@ -49,7 +56,8 @@ Examples:
   resolvent render cloud.vdb --optical-thickness 20 --sun 1,0.3,0.5 --save-scene cloud.json
   resolvent render scene.json -o out.exr --time 60 --aov depth,variance
   resolvent render scene.json -o tile.exr --crop 0,0,320,180
-  resolvent render scene.json -o part2.exr --sample-range 64..128    (merge: mean of parts by samples)
+  resolvent render scene.json -o out.exr --spp 4096 --checkpoint out.ckpt --resume    (again after a crash)
+  resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt    (resolvent merge a.ckpt b.ckpt -o out.exr)
 
 Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once.";
 
@@ -70,7 +78,7 @@ pub struct Render {
     /// Sample for so many seconds
     #[arg(long, value_name = "S", value_parser = positive, group = "budget", help_heading = "Sampling")]
     pub time: Option<f64>,
-    /// Sample until the estimated relative error of the picture (root mean square) is at most this, such as 0.02
+    /// Sample every tile until its estimated relative error (root mean square) is at most this, such as 0.02
     #[arg(long, value_name = "E", value_parser = positive, group = "budget", help_heading = "Sampling")]
     pub error: Option<f64>,
     /// Take samples A up to, not including, B of every pixel's sequence; parts merge to one run
@@ -92,20 +100,23 @@ pub struct Render {
     /// Render only this window; X1 and Y1 are outside of it
     #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Picture")]
     pub crop: Option<Window>,
-    /// Further layers of EXR files
+    /// Further layers of EXR files: depth, albedo, normal (of the first collision or surface), variance (of each pixel's mean),
+    /// samples, or orders:N (light scattered 0, 1, ... N times, and the rest: layers that sum to the picture)
     #[arg(
         long,
         value_name = "LAYER",
+        value_parser = layer,
         value_delimiter = ',',
         help_heading = "Picture"
     )]
-    pub aov: Vec<Layer>,
-    /// Exposure of PNG files, in stops
-    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, help_heading = "Picture")]
-    pub exposure: f64,
-    /// How PNG files bring large values into the display's range
-    #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic, help_heading = "Picture")]
-    pub tone_map: ToneCurve,
+    pub aov: Vec<Aov>,
+    /// How PNG files are made
+    #[command(flatten)]
+    pub tone: Tone,
+
+    /// What is kept of the work
+    #[command(flatten)]
+    pub aim: Aim,
 
     /// What to choose instead of guessing, for VDB files and models
     #[command(flatten)]
@@ -123,6 +134,33 @@ pub struct Render {
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// How PNG files are made.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Picture")]
+pub struct Tone {
+    /// Exposure of PNG files, in stops
+    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// How PNG files bring large values into the display's range
+    #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic)]
+    pub tone_map: ToneCurve,
+}
+
+/// What is kept of the work.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Checkpoints")]
+pub struct Aim {
+    /// Keep the exact sums in this file: now and then while rendering, and at the end
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// Seconds between checkpoints: so much work may be lost by a crash
+    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 60.0, requires = "checkpoint")]
+    pub every: f64,
+    /// Go on from the checkpoint if there is one: the picture has the same bits as that of a render that was not interrupted
+    #[arg(long, requires = "checkpoint")]
+    pub resume: bool,
 }
 
 /// Options that replace guesses about a VDB file or a model.
@@ -240,21 +278,6 @@ impl PluginPath {
     }
 }
 
-/// Further layers.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub enum Layer {
-    /// Distance to the first collision or surface
-    Depth,
-    /// Albedo there
-    Albedo,
-    /// Normal there
-    Normal,
-    /// Variance of each pixel's mean
-    Variance,
-    /// Samples taken
-    Samples,
-}
-
 /// Curves of PNG files.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub enum ToneCurve {
@@ -296,6 +319,34 @@ pub struct Compare {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Options of `merge`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent render scene.json --sample-range 0..64 --checkpoint a.ckpt\n  resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt\n  resolvent merge a.ckpt b.ckpt -o out.exr\n\nThe picture has the same bits as that of one render of all samples. Ranges that meet at multiples of 64 (of 128 from sample 1024 on, of 256 from 4096 on ...) divide no net: then this holds for the variance of bdpt and light as well, and for the chains of mlt, of which every part of a net has its own."
+)]
+pub struct Merge {
+    /// Checkpoints of the same scene, seed, integrator and layers
+    #[arg(required = true, value_name = "CHECKPOINT")]
+    pub checkpoints: Vec<PathBuf>,
+    /// Picture to write, .exr or .png; may be given several times
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "checkpoint"
+    )]
+    pub output: Vec<PathBuf>,
+    /// Write the sums as a checkpoint
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// How PNG files are made
+    #[command(flatten)]
+    pub tone: Tone,
+    /// Print only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// Options of `plugin`.

@@ -4,7 +4,10 @@
 //! usage, input or plugin, 3 interrupted with the finished part saved.
 
 mod args;
+#[cfg(feature = "bench")]
+mod bench;
 mod check;
+mod checkpoint;
 mod compare;
 mod console;
 mod failure;
@@ -12,6 +15,7 @@ mod guess;
 mod info;
 mod input;
 mod interrupt;
+mod merge;
 mod output;
 mod overrides;
 mod plugin;
@@ -43,6 +47,9 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
+        args::Command::Merge(a) => merge::run(&a),
+        #[cfg(feature = "bench")]
+        args::Command::Bench(a) => bench::run(&a),
         args::Command::Plugin(a) => plugin::run(&a),
         args::Command::Schema(a) => plugin::schema(&a),
     });

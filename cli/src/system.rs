@@ -1,4 +1,4 @@
-//! What the operating system says about memory.
+//! What the operating system says about memory and time.
 
 /// Largest memory this process has held, bytes; `None` where the system does not say.
 pub fn peak_memory() -> Option<u64> {
@@ -8,6 +8,15 @@ pub fn peak_memory() -> Option<u64> {
 /// Memory that can be had without swapping, bytes; `None` where the system does not say.
 pub fn available_memory() -> Option<u64> {
     proc_kilobytes("/proc/meminfo", "MemAvailable:")
+}
+
+/// CPU seconds that this process has taken, over all its threads; `None` where the system does not say.
+pub fn cpu_seconds() -> Option<f64> {
+    use nix::sys::resource::{UsageWho, getrusage};
+    let usage = getrusage(UsageWho::RUSAGE_SELF).ok()?;
+    let seconds = [usage.user_time(), usage.system_time()]
+        .map(|t| t.tv_sec() as f64 + t.tv_usec() as f64 * 1e-6);
+    Some(seconds[0] + seconds[1])
 }
 
 fn proc_kilobytes(file: &str, key: &str) -> Option<u64> {

@@ -7,6 +7,10 @@ use crate::closure::Closure;
 use crate::math::{Float3, Frame, Vec3};
 use crate::spectrum::Spectrum;
 
+/// False in a build that leaves the code for media out (`--cfg resolvent_surfaces_only`). Such a build renders scenes without
+/// media only; it is there to measure what that code costs them.
+pub const WITH_MEDIA: bool = cfg!(not(resolvent_surfaces_only));
+
 /// What a vertex is.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,7 +116,7 @@ impl Vertex {
     /// True if this is a vertex of the given kind.
     #[inline(always)]
     pub fn is(&self, kind: VertexKind) -> bool {
-        self.kind == kind as u32
+        self.kind == kind as u32 && (WITH_MEDIA || !matches!(kind, VertexKind::Medium))
     }
 
     /// True if at infinity.

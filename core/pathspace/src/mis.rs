@@ -6,7 +6,7 @@
 //!
 //!   ⟨I⟩ = f_λ / mean over λ' of Σ_techniques p_λ'
 
-use resolvent_api::vertex::Edge;
+use resolvent_api::vertex::{Edge, WITH_MEDIA};
 use resolvent_api::{Flight, Spectrum};
 
 /// Contribution and density of a path so far, lane by lane, sharing one arbitrary scale.
@@ -78,6 +78,9 @@ impl Throughput {
     /// connecting would have found it with `other` times that density: f·value / mean(p·(track + other·ratio)).
     #[inline(always)]
     pub fn found<const CHROMATIC: bool>(&self, edge: &Edge, other: f32, lanes: u32) -> Spectrum {
+        if !WITH_MEDIA {
+            return self.f * (1.0 / (1.0 + other));
+        }
         if CHROMATIC {
             let density = self.p * (edge.track + edge.ratio * other);
             self.f * edge.value / density.mean(lanes)
@@ -101,6 +104,9 @@ impl Throughput {
         other: f32,
         lanes: u32,
     ) -> Spectrum {
+        if !WITH_MEDIA {
+            return self.f * (1.0 / (density + other));
+        }
         if CHROMATIC {
             let total = self.p * (edge.ratio * density + edge.track * other);
             let mean = total.mean(lanes);
@@ -129,6 +135,17 @@ pub enum Heuristic {
     Power,
     /// 1: the strategy is the only one used.
     Alone,
+}
+
+/// What weights take for the densities of the media between two vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MediaDensities {
+    /// Those of the null collisions that came about (Miller et al. 2019): exact over all strategies and lanes, and as random as
+    /// they are.
+    Exact,
+    /// Those of flights and connections through a deterministic, approximate optical depth: smooth. Each strategy then is divided by
+    /// its own exact density, and weighed by these.
+    Depth,
 }
 
 /// The densities of a whole path x_0 … x_n, x_0 on a light and x_n on the sensor, under all strategies: strategy s takes
@@ -178,6 +195,14 @@ impl Strategies {
         self.rho.len()
     }
 
+    /// True if strategy `k` may give the path light: nothing is connected to what was turned by a delta lobe, and its walks find
+    /// every vertex.
+    pub fn can(&self, k: usize) -> bool {
+        let walked = self.from_light.iter().take(if k > 1 { k } else { 0 });
+        let seen = self.from_sensor[..self.edges()].iter().skip(k);
+        self.extra(k) > 0.0 && walked.chain(seen).all(|p| *p > 0.0)
+    }
+
     /// What strategy `k` has beside the products of L and S: 0 if it cannot be.
     fn extra(&self, k: usize) -> f64 {
         let n = self.edges();
@@ -224,10 +249,9 @@ impl Strategies {
         }
     }
 
-    /// The weight of strategy `s` by the balance heuristic, for lane densities as in [`Strategies::divisor`].
-    pub fn weight(&self, s: usize, track: Spectrum, lanes: u32) -> f64 {
-        self.divisor(s, track, lanes, Heuristic::Alone)
-            / self.divisor(s, track, lanes, Heuristic::Balance)
+    /// The weight of strategy `s`, for lane densities as in [`Strategies::divisor`].
+    pub fn weight(&self, s: usize, track: Spectrum, lanes: u32, heuristic: Heuristic) -> f64 {
+        self.divisor(s, track, lanes, Heuristic::Alone) / self.divisor(s, track, lanes, heuristic)
     }
 
     /// What strategy `s` divides contribution over its own grey density by, for a path whose walks and connection have the
@@ -280,6 +304,7 @@ pub fn rho(edge: &Edge) -> Spectrum {
 }
 
 /// An edge that nothing hinders.
+#[inline(always)]
 pub fn clear(length: f32) -> Edge {
     let f = Flight::vacuum(length);
     Edge {

@@ -1,5 +1,7 @@
 //! The program as a user runs it: every test starts the real binary.
 
+mod bench;
+mod checkpoint;
 mod determinism;
 mod errors;
 mod hostile;
@@ -8,6 +10,7 @@ mod interrupt;
 mod models;
 mod program;
 mod render;
+mod skips;
 mod stats;
 mod textures;
 mod tools;

@@ -138,6 +138,21 @@ impl Table {
             self.samples,
             self.start.elapsed().as_secs_f64()
         );
+        crate::report::line(
+            "physics.md",
+            &format!(
+                "| {} | {} | {} | {:.1e} | {worst:.2} | {} |",
+                self.name,
+                self.rows.len(),
+                self.claims,
+                self.samples,
+                if n > 0 {
+                    format!("{chi2:.1} / {n}")
+                } else {
+                    "–".into()
+                }
+            ),
+        );
         if high < LEVEL {
             self.failures.push(format!(
                 "chi2 {chi2:.1} of {n} is too large: p = {high:.1e}"

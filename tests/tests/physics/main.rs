@@ -10,18 +10,24 @@
 mod agreement;
 mod harness;
 mod judge;
+mod report;
 mod scenes;
 
 mod instances;
 mod lights;
 mod materials;
 mod nested;
+mod orders;
+mod peers;
 mod points;
 mod slab_flux;
 mod slab_radiance;
+mod soak;
 mod strategies;
+mod stress_index;
 mod stress_media;
 mod stress_places;
+mod stress_rest;
 mod stress_world;
 mod surfaces;
 mod transmittance;

@@ -110,7 +110,8 @@ fn layouts_agree() {
         "closure": Closure {},
         "medium_point": MediumPoint { "lanes" = lanes },
         "surface_point": SurfacePoint {
-            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior
+            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior,
+            "color" = color
         },
         "phase_table": PhaseTable { "create" = create, "closure" = closure },
         "bsdf_table": BsdfTable { "traits" = traits, "closure" = closure, "ior" = ior },

@@ -79,7 +79,7 @@ impl Lights {
                 vertex.frame = frame;
                 vertex.primitive = [area.shape, at.prim];
                 vertex.wo = d.into();
-                let radiance = area.radiance_at(at.uv);
+                let radiance = area.radiance_at(at.uv, &at.color);
                 vertex.uv = at.uv;
                 vertex.emitted = radiance;
                 let o = offset_origin(at.p, at.error(), at.ng, d);

@@ -14,7 +14,9 @@ use resolvent_api::operator::{
 use resolvent_api::phase::MediumPoint;
 use resolvent_api::rng::derive;
 use resolvent_api::surface::SurfacePoint as BsdfPoint;
-use resolvent_api::vertex::{Edge, LightSample, NONE, Vertex, VertexKind, vertex_flags};
+use resolvent_api::vertex::{
+    Edge, LightSample, NONE, Vertex, VertexKind, WITH_MEDIA, vertex_flags,
+};
 use resolvent_api::{Event, Spectrum};
 
 /// Boundaries a ray may pass before the scene is taken to be broken.
@@ -176,7 +178,11 @@ impl View<'_> {
         edge: &mut Edge,
         next: &mut Vertex,
     ) -> Result<bool, Status> {
-        *edge = resolvent_pathspace::mis::clear(0.0);
+        if WITH_MEDIA {
+            *edge = resolvent_pathspace::mis::clear(0.0);
+        } else {
+            edge.length = 0.0;
+        }
         let mut u = *u;
         for boundary in 0..MAX_BOUNDARIES {
             let hit = if SURFACES { self.closest(o, d) } else { None };
@@ -343,6 +349,7 @@ impl View<'_> {
             uv: next.uv,
             lanes: self.scene.lanes,
             outside_ior: self.scene.outside_ior(surface, next.inside),
+            color: at.color,
         };
         material
             .bsdf
@@ -392,6 +399,10 @@ impl View<'_> {
             if accel.occluded(&ray) {
                 return Ok(false);
             }
+        }
+        if !WITH_MEDIA {
+            edge.length = to.distance;
+            return Ok(true);
         }
         let (segment, _) = unit_segment(&ray);
         let Some((f, met)) = self.pass::<MEDIA>(&segment, inside, u)? else {

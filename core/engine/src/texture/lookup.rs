@@ -18,7 +18,9 @@ enum Curve {
 
 /// An image and how it is read.
 pub struct Texture {
-    texels: Arc<Texels>,
+    /// Without an image it is white.
+    texels: Option<Arc<Texels>>,
+    vertex_color: bool,
     curve: Curve,
     wrap: [Wrap; 2],
     nearest: bool,
@@ -31,20 +33,23 @@ pub struct Texture {
 
 impl Texture {
     /// The image `texels` with the settings of `t`.
-    pub fn new(texels: Arc<Texels>, t: &describe::Texture) -> Self {
-        let srgb = match t.color_space {
-            ColorSpace::Auto => !texels.data.is_float(),
-            ColorSpace::Srgb => true,
-            ColorSpace::Linear => false,
-        };
-        let curve = match (&texels.data, srgb) {
-            (_, false) => Curve::None,
-            (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
-            (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
-            (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
-        };
+    pub fn new(texels: Option<Arc<Texels>>, t: &describe::Texture) -> Self {
+        let curve = texels.as_ref().map_or(Curve::None, |texels| {
+            let srgb = match t.color_space {
+                ColorSpace::Auto => !texels.data.is_float(),
+                ColorSpace::Srgb => true,
+                ColorSpace::Linear => false,
+            };
+            match (&texels.data, srgb) {
+                (_, false) => Curve::None,
+                (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
+                (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
+                (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
+            }
+        });
         Self {
             texels,
+            vertex_color: t.vertex_color,
             curve,
             wrap: t.wrap,
             nearest: t.filter == TextureFilter::Nearest,
@@ -60,35 +65,50 @@ impl Texture {
         }
     }
 
-    /// Red, green, blue and alpha at the surface's texture coordinates.
+    /// Red, green, blue and alpha at the surface's texture coordinates, where the mesh has the colour `color`.
     #[inline]
-    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
-        // The image's rows go down, its coordinates up.
-        let (x, y) = (self.along(0, x), self.along(1, 1.0 - y));
-        let v = if self.nearest {
-            self.texel(x.nearest(), y.nearest())
-        } else {
-            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
-            let (a, b) = (self.texel(x0, y0), self.texel(x1, y0));
-            let (c, d) = (self.texel(x0, y1), self.texel(x1, y1));
-            // Equal texels give exactly their value.
-            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
-            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
+    pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
+        let mut v = match &self.texels {
+            Some(texels) => self.image(texels, uv),
+            None => [1.0; 4],
         };
+        if self.vertex_color {
+            v.iter_mut().zip(color).for_each(|(v, c)| *v *= c);
+        }
         self.finish(v)
     }
 
-    /// Mean over the texels of red, green, blue and alpha after `bound`.
+    #[inline(always)]
+    fn image(&self, texels: &Texels, uv: [f32; 2]) -> [f32; 4] {
+        let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+        // The image's rows go down, its coordinates up.
+        let x = Along::new(x, texels.width, self.wrap[0]);
+        let y = Along::new(1.0 - y, texels.height, self.wrap[1]);
+        if self.nearest {
+            self.texel(texels, x.nearest(), y.nearest())
+        } else {
+            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
+            let [a, b, c, d] =
+                [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].map(|(x, y)| self.texel(texels, x, y));
+            // Equal texels give exactly their value.
+            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
+            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
+        }
+    }
+
+    /// Mean over the texels of red, green, blue and alpha after `bound`, where the mesh is white.
     pub fn mean(&self, bound: impl Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
+        let Some(texels) = &self.texels else {
+            return bound(self.finish([1.0; 4]));
+        };
         let mut sum = [0f64; 4];
-        for y in 0..self.texels.height {
-            for x in 0..self.texels.width {
-                let v = bound(self.finish(self.texel(x, y)));
+        for y in 0..texels.height {
+            for x in 0..texels.width {
+                let v = bound(self.finish(self.texel(texels, x, y)));
                 (0..4).for_each(|i| sum[i] += f64::from(v[i]));
             }
         }
-        let n = (self.texels.width * self.texels.height) as f64;
+        let n = (texels.width * texels.height) as f64;
         sum.map(|s| (s / n) as f32)
     }
 
@@ -102,20 +122,9 @@ impl Texture {
         [r, g, b, v[3]]
     }
 
-    #[inline(always)]
-    fn along(&self, axis: usize, coordinate: f32) -> Along {
-        let size = if axis == 0 {
-            self.texels.width
-        } else {
-            self.texels.height
-        };
-        Along::new(coordinate, size, self.wrap[axis])
-    }
-
     /// The texel in column `x` of row `y`, decoded.
     #[inline(always)]
-    fn texel(&self, x: usize, y: usize) -> [f32; 4] {
-        let t = &*self.texels;
+    fn texel(&self, t: &Texels, x: usize, y: usize) -> [f32; 4] {
         let first = (y * t.width + x) * t.channels;
         let range = first..first + t.channels;
         match &t.data {
@@ -233,6 +242,8 @@ mod tests {
     use super::*;
     use describe::{ImageSource, UvTransform};
 
+    const WHITE: [f32; 4] = [1.0; 4];
+
     fn described() -> describe::Texture {
         describe::Texture {
             color_space: ColorSpace::Linear,
@@ -250,11 +261,11 @@ mod tests {
         };
         let mut t = described();
         edit(&mut t);
-        Texture::new(Arc::new(texels), &t)
+        Texture::new(Some(Arc::new(texels)), &t)
     }
 
     fn red(t: &Texture, u: f32, v: f32) -> f32 {
-        t.at([u, v])[0]
+        t.at([u, v], &WHITE)[0]
     }
 
     #[test]
@@ -342,22 +353,22 @@ mod tests {
             data: TexelData::U8(vec![0, 128, 255, 128, 255, 128, 0, 0]),
         };
         let srgb = describe::Texture::new(ImageSource::File("x.png".into()));
-        let t = Texture::new(Arc::new(rgba.clone()), &srgb);
+        let t = Texture::new(Some(Arc::new(rgba.clone())), &srgb);
         let half = srgb::linear(128.0 / 255.0) as f32;
-        assert_eq!(t.at([0.25, 0.5]), [0.0, half, 1.0, 128.0 / 255.0]);
-        let middle = t.at([0.5, 0.5]);
+        assert_eq!(t.at([0.25, 0.5], &WHITE), [0.0, half, 1.0, 128.0 / 255.0]);
+        let middle = t.at([0.5, 0.5], &WHITE);
         assert_eq!(middle[0], 0.5);
         assert!((middle[3] - 64.0 / 255.0).abs() < 1e-7);
-        let t = Texture::new(Arc::new(rgba), &described());
-        assert_eq!(t.at([0.25, 0.5])[1], 128.0 / 255.0);
+        let t = Texture::new(Some(Arc::new(rgba)), &described());
+        assert_eq!(t.at([0.25, 0.5], &WHITE)[1], 128.0 / 255.0);
         let wide = Texels {
             width: 1,
             height: 1,
             channels: 3,
             data: TexelData::U16(vec![0, 32_896, 65_535]),
         };
-        let t = Texture::new(Arc::new(wide), &srgb);
-        assert_eq!(t.at([0.3, 0.3]), [0.0, half, 1.0, 1.0]);
+        let t = Texture::new(Some(Arc::new(wide)), &srgb);
+        assert_eq!(t.at([0.3, 0.3], &WHITE), [0.0, half, 1.0, 1.0]);
     }
 
     #[test]
@@ -370,14 +381,14 @@ mod tests {
         });
         let auto = describe::Texture::new(ImageSource::File("x.exr".into()));
         assert_eq!(
-            Texture::new(texels.clone(), &auto).at([0.0, 0.0]),
+            Texture::new(Some(texels.clone()), &auto).at([0.0, 0.0], &WHITE),
             [0.5, -0.5, 4.0, 1.0]
         );
         let srgb = describe::Texture {
             color_space: ColorSpace::Srgb,
             ..auto
         };
-        let v = Texture::new(texels, &srgb).at([0.0, 0.0]);
+        let v = Texture::new(Some(texels), &srgb).at([0.0, 0.0], &WHITE);
         assert_eq!([v[0], v[1]], [0.5, -0.5].map(|x| srgb::linear(x) as f32));
     }
 
@@ -392,12 +403,38 @@ mod tests {
         let mut t = described();
         t.scale = [2.0, -1.0, 0.0];
         t.bias = [0.0, 1.0, 0.125];
-        let grey = Texture::new(texels.clone(), &t);
-        assert_eq!(grey.at([0.25, 0.0]), [0.5, 0.75, 0.125, 0.5]);
+        let grey = Texture::new(Some(texels.clone()), &t);
+        assert_eq!(grey.at([0.25, 0.0], &WHITE), [0.5, 0.75, 0.125, 0.5]);
         assert_eq!(grey.mean(|v| v), [1.0, 0.5, 0.125, 0.75]);
         t.channel = Some(TextureChannel::Alpha);
-        let alpha = Texture::new(texels, &t);
-        assert_eq!(alpha.at([0.25, 0.0]), [1.0, 0.5, 0.125, 0.5]);
+        let alpha = Texture::new(Some(texels), &t);
+        assert_eq!(alpha.at([0.25, 0.0], &WHITE), [1.0, 0.5, 0.125, 0.5]);
+    }
+
+    /// Vertex colours are factors on texels, alpha included, before a channel is picked; without an image they stand alone.
+    #[test]
+    fn colours_of_vertices() {
+        let texels = Arc::new(Texels {
+            width: 1,
+            height: 1,
+            channels: 2,
+            data: TexelData::F32(vec![0.5, 0.25]),
+        });
+        let color = [0.5, 1.0, 2.0, 0.5];
+        let mut t = described();
+        assert_eq!(
+            Texture::new(Some(texels.clone()), &t).at([0.5; 2], &color),
+            [0.5, 0.5, 0.5, 0.25]
+        );
+        t.vertex_color = true;
+        let product = Texture::new(Some(texels.clone()), &t).at([0.5; 2], &color);
+        assert_eq!(product, [0.25, 0.5, 1.0, 0.125]);
+        assert_eq!(Texture::new(None, &t).at([0.5; 2], &color), color);
+        t.channel = Some(TextureChannel::Alpha);
+        t.scale = [2.0; 3];
+        let alpha = Texture::new(Some(texels), &t).at([0.5; 2], &color);
+        assert_eq!(alpha[..3], [0.25; 3]);
+        assert_eq!(Texture::new(None, &t).mean(|v| v)[..3], [2.0; 3]);
     }
 
     /// The transform scales, rotates counter-clockwise and moves, in this order.

@@ -22,10 +22,10 @@ impl Binding {
         Self { texture, min, max }
     }
 
-    /// Red, green, blue and alpha: finite, and all but alpha within the parameter's range.
+    /// Red, green, blue and alpha where the mesh has the colour `color`: finite, and all but alpha within the parameter's range.
     #[inline]
-    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        self.bounded(self.texture.at(uv))
+    pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
+        self.bounded(self.texture.at(uv, color))
     }
 
     /// Mean over the texels of the image.
@@ -82,6 +82,32 @@ struct State {
     textures: HashMap<String, Arc<Texture>>,
 }
 
+impl State {
+    /// The texels of a texture's image, read if nobody has yet.
+    fn image(
+        &mut self,
+        key: Key,
+        name: &str,
+        described: &describe::Texture,
+        scene: &describe::Scene,
+    ) -> Result<Arc<Texels>> {
+        if let Some(index) = self.images.get(&key) {
+            return Ok(self.read[*index].texels.clone());
+        }
+        let image = read(&described.image, scene).map_err(|e| {
+            let what = format!("texture '{name}': {e}");
+            describe::Problem::new(&scene.source.file, described.place.clone(), what)
+        })?;
+        let Some(image) = image else {
+            return Err(Error::Input(format!("the texture '{name}' has no image")));
+        };
+        let texels = image.texels.clone();
+        self.images.insert(key, self.read.len());
+        self.read.push(image);
+        Ok(texels)
+    }
+}
+
 /// The textures of one scene: an image is read when the first user asks for a texture of it, and once.
 #[derive(Default)]
 pub struct Textures {
@@ -110,24 +136,16 @@ impl Textures {
         let key = match &described.image {
             ImageSource::File(file) => {
                 let path = scene.resolve(file);
-                Key::File(path.canonicalize().unwrap_or(path))
+                Some(Key::File(path.canonicalize().unwrap_or(path)))
             }
-            ImageSource::Memory(image) => Key::Memory(image.bytes.as_ptr().addr()),
+            ImageSource::Memory(image) => Some(Key::Memory(image.bytes.as_ptr().addr())),
+            ImageSource::White => None,
         };
-        let index = match state.images.get(&key) {
-            Some(index) => *index,
-            None => {
-                let image = read(&described.image, scene).map_err(|e| {
-                    let what = format!("texture '{name}': {e}");
-                    describe::Problem::new(&scene.source.file, described.place.clone(), what)
-                })?;
-                state.read.push(image);
-                let index = state.read.len() - 1;
-                state.images.insert(key, index);
-                index
-            }
+        let texels = match key {
+            Some(key) => Some(state.image(key, name, described, scene)?),
+            None => None,
         };
-        let texture = Arc::new(Texture::new(state.read[index].texels.clone(), described));
+        let texture = Arc::new(Texture::new(texels, described));
         state.textures.insert(name.to_owned(), texture.clone());
         Ok(texture)
     }
@@ -142,8 +160,8 @@ impl Textures {
 fn read(
     source: &ImageSource,
     scene: &describe::Scene,
-) -> std::result::Result<ReadImage, resolvent_image::Error> {
-    Ok(match source {
+) -> std::result::Result<Option<ReadImage>, resolvent_image::Error> {
+    Ok(Some(match source {
         ImageSource::File(file) => {
             let path = scene.resolve(file);
             let (texels, file_bytes) = Texels::read(&path)?;
@@ -160,5 +178,6 @@ fn read(
             texels: Arc::new(Texels::parse(&image.bytes, &image.name, Limits::default())?),
             _bytes: Some(image.bytes.clone()),
         },
-    })
+        ImageSource::White => return Ok(None),
+    }))
 }

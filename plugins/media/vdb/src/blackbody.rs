@@ -19,11 +19,13 @@ pub struct Blackbody {
 
 impl Default for Blackbody {
     fn default() -> Self {
+        let observed: Vec<_> = (360..=830).map(|nm| observer(f64::from(nm))).collect();
         let table = (0..=STEPS)
             .map(|i| {
                 let inverse =
                     inverse(0.0) + (inverse(1.0) - inverse(0.0)) * i as f64 / STEPS as f64;
-                rgb(1.0 / inverse).map(|v| if v > 1e-40 { v.ln() as f32 } else { NOTHING })
+                rgb(1.0 / inverse, &observed)
+                    .map(|v| if v > 1e-40 { v.ln() as f32 } else { NOTHING })
             })
             .collect();
         Self { table }
@@ -59,12 +61,11 @@ impl Blackbody {
     }
 }
 
-/// Linear sRGB of a black body by integration from 360 to 830 nm.
-fn rgb(kelvin: f64) -> [f64; 3] {
+/// Linear sRGB of a black body by integration from 360 to 830 nm, for the observer at these wavelengths.
+fn rgb(kelvin: f64, observed: &[[f64; 3]]) -> [f64; 3] {
     let mut xyz = [0.0; 3];
-    for nm in 360..=830 {
+    for (nm, matching) in (360..).zip(observed) {
         let b = planck(f64::from(nm), kelvin) * 1e-9;
-        let matching = observer(f64::from(nm));
         for c in 0..3 {
             xyz[c] += matching[c] * b;
         }
@@ -116,8 +117,9 @@ mod tests {
     #[test]
     fn table_follows_the_integral() {
         let table = Blackbody::default();
+        let observed: Vec<_> = (360..=830).map(|nm| observer(f64::from(nm))).collect();
         for kelvin in [401.0, 777.7, 1500.0, 2856.0, 6504.0, 25_000.0] {
-            let (exact, got) = (rgb(kelvin), table.radiance(kelvin as f32));
+            let (exact, got) = (rgb(kelvin, &observed), table.radiance(kelvin as f32));
             for c in 0..3 {
                 let error = (f64::from(got[c]) - exact[c]).abs();
                 assert!(

@@ -1,0 +1,273 @@
+//! Stated errors are true: over many seeds, intervals cover what they should, and adaptive renders have the mean of uniform ones.
+
+use rayon::prelude::*;
+use resolvent_api::{Affine, PluginKind};
+use resolvent_engine::film::{Errors, student};
+use resolvent_engine::plugin::{ForeignIntegrator, Registry};
+use resolvent_engine::scene::Scene;
+use resolvent_engine::{Goal, Rendered, Settings, render};
+use resolvent_scene::Filter;
+use resolvent_tests::Moments;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Everything is run, not only the default part.
+fn full() -> bool {
+    std::env::var_os("RESOLVENT_FULL").is_some_and(|v| v == "1")
+}
+
+/// An example scene in a small size.
+struct Shot {
+    scene: Scene,
+    integrator: ForeignIntegrator,
+    size: [u32; 2],
+}
+
+impl Shot {
+    fn new(name: &str, integrator: &str, size: [u32; 2]) -> Self {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../scenes")
+            .join(name);
+        let mut described = resolvent_scene::Scene::read(file).unwrap_or_else(|e| panic!("{e}"));
+        described.film.resolution = size;
+        described.film.filter = Filter::Box { radius: 0.5 };
+        described.integrator = resolvent_scene::PluginBlock::new(integrator);
+        let registry = Registry::new(&[]);
+        let scene = Scene::build(&described, &registry).unwrap_or_else(|e| panic!("{e}"));
+        let kind = PluginKind::Integrator;
+        let block = &described.integrator;
+        let instance = registry
+            .instantiate(kind, block, &described, &Affine::IDENTITY, scene.lanes)
+            .unwrap_or_else(|e| panic!("{e}"));
+        Self {
+            scene,
+            integrator: ForeignIntegrator::new(instance).unwrap_or_else(|e| panic!("{e}")),
+            size,
+        }
+    }
+
+    fn render(&self, seed: u64, samples: u32, goal: Goal) -> Rendered {
+        let settings = Settings {
+            resolution: self.size,
+            window: [0, 0, self.size[0], self.size[1]],
+            samples: 0..samples,
+            goal,
+            seed,
+            features: false,
+            orders: 0,
+        };
+        let (scene, stop) = (&self.scene, AtomicBool::new(false));
+        render(scene, &self.integrator, &settings, &stop, &|_| {})
+            .unwrap_or_else(|e| panic!("{}", e.error))
+    }
+
+    fn pixels(&self) -> usize {
+        (self.size[0] * self.size[1]) as usize
+    }
+}
+
+/// What many renders say of themselves, against their mean.
+#[derive(Debug)]
+struct Calibration {
+    /// Share of pixels and lanes whose 95 % interval covers the truth.
+    pixels: f64,
+    /// Share of pictures whose interval of the mean covers the truth, over lanes.
+    means: f64,
+    /// Mean square of the true relative error over that of the stated one.
+    error: f64,
+    /// The same of the picture's mean: variance over the mean of stated variances.
+    variance: f64,
+    /// Share of pictures that doubt their error.
+    doubtful: f64,
+}
+
+fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
+    let all: Vec<Rendered> = (0..seeds)
+        .into_par_iter()
+        .map(|seed| shot.render(seed + 1, samples, Goal::Samples))
+        .collect();
+    let n = seeds as f64;
+    // The truth is the mean of all others, whose own error widens the difference a little.
+    let widening = 1.0 + 1.0 / (n - 1.0);
+    let (mut covered, mut tested) = (0.0, 0.0);
+    let mut true_error = 0.0;
+    let mut pixel_means = vec![[0.0; 3]; shot.pixels()];
+    for (i, mean) in pixel_means.iter_mut().enumerate() {
+        for r in &all {
+            let e = r.film.estimate(i);
+            for k in 0..3 {
+                mean[k] += e.mean[k] / n;
+            }
+        }
+    }
+    let level = pixel_means.iter().flatten().sum::<f64>() / (3 * shot.pixels()) as f64;
+    // The picture is one tile, or even enough to be taken for one.
+    let mean_of = |k: usize| pixel_means.iter().map(|m| m[k]).sum::<f64>();
+    let level_of_tile = [0, 1, 2].map(|k| mean_of(k) / shot.pixels() as f64);
+    let (mut sum_of_variance, mut sum_of_squares) = (0.0, 0.0);
+    for (i, truth) in pixel_means.iter().enumerate() {
+        for r in &all {
+            let e = r.film.estimate(i);
+            let variance = e.variance.unwrap_or_else(|| panic!("no variance"));
+            for k in 0..3 {
+                let off = (e.mean[k] - truth[k]) * n / (n - 1.0);
+                let half = student(e.degrees[k]) * variance[k].sqrt();
+                // Pixels without noise, of a constant sky, differ by rounding alone.
+                let rounding = 1e-12 * truth[k].abs();
+                covered += f64::from(u8::from(off.abs() <= half * widening.sqrt() + rounding));
+                tested += 1.0;
+                let mean = level_of_tile[k];
+                true_error += off * off / widening / (mean * mean + 0.01 * level * level);
+                sum_of_variance += variance[k];
+                sum_of_squares += off * off / widening;
+            }
+        }
+    }
+    let stated = |e: Option<Errors>| e.map_or(f64::NAN, |e| e.picture * e.picture);
+    let stated_error = all.iter().map(|r| stated(r.film.errors())).sum::<f64>() / n;
+    let mut means = 0.0;
+    for k in 0..3 {
+        let of = |r: &Rendered| {
+            r.film
+                .interval()
+                .map_or((f64::NAN, 0.0), |i| (i.mean[k], i.half_width[k]))
+        };
+        let truth = Moments::of(all.iter().map(|r| of(r).0)).mean();
+        let inside = |r: &&Rendered| {
+            let (mean, half) = of(r);
+            ((mean - truth) * n / (n - 1.0)).abs() <= half * widening.sqrt()
+        };
+        means += all.iter().filter(inside).count() as f64 / n / 3.0;
+    }
+    let doubtful = |r: &&Rendered| r.film.errors().is_some_and(|e| e.are_doubtful());
+    Calibration {
+        pixels: covered / tested,
+        means,
+        error: true_error / tested / stated_error,
+        variance: sum_of_squares / sum_of_variance,
+        doubtful: all.iter().filter(doubtful).count() as f64 / n,
+    }
+}
+
+/// 95 % intervals of 200 renders cover the truth 93 to 97 % of the time, pixel by pixel and for the whole picture, and the stated error
+/// is the true one; where tails are so heavy that this cannot be, the picture says so.
+#[test]
+fn intervals_cover_the_truth() {
+    // Net by net: 64 samples are four of 16; smooth surfaces, fog, a cloud in the sun, walks from both ends, chains.
+    let scenes: [(&str, &str, u32); 5] = [
+        ("bench/surface_only.json", "pt", 64),
+        ("bench/surface_only.json", "pt", 256),
+        ("bench/box_fog.json", "pt", 128),
+        ("bench/cloud_sun.json", "pt", 64),
+        ("lampshade/lampshade.json", "bdpt", 64),
+    ];
+    for (name, integrator, samples) in scenes {
+        let begin = std::time::Instant::now();
+        let shot = Shot::new(name, integrator, [8, 6]);
+        let samples = samples * if full() { 4 } else { 1 };
+        let c = calibrate(&shot, 200, samples);
+        println!("{name} {integrator} {samples}: {c:?} {:?}", begin.elapsed());
+        // Of 200 pictures 1.5 % is the standard error of a share of 95 %.
+        assert!((0.9..=1.0).contains(&c.means), "{name}: {c:?}");
+        assert!((0.7..1.3).contains(&c.variance), "{name}: {c:?}");
+        assert!((0.7..1.3).contains(&c.error), "{name}: {c:?}");
+        assert!(c.pixels > 0.85 && c.pixels < 0.97, "{name}: {c:?}");
+    }
+}
+
+/// Caustics found by chance: whatever the picture says of its error is wrong, and it says that as well.
+#[test]
+fn heavy_tails_are_told() {
+    let shot = Shot::new("caustic/caustic.json", "pt", [16, 16]);
+    let c = calibrate(&shot, 24, 64);
+    println!("{c:?}");
+    assert!(c.doubtful > 0.5, "{c:?}");
+}
+
+/// Adaptive renders have the mean of uniform ones, tile by tile.
+#[test]
+fn adaptive_means_are_not_biased() {
+    let shot = Shot::new("bench/cloud_sun.json", "pt", [20, 12]);
+    let seeds: u64 = if full() { 200 } else { 12 };
+    let goal = 0.3;
+    let mean = |r: &Rendered| -> f64 {
+        let all = (0..shot.pixels()).map(|i| r.film.estimate(i).mean[0]);
+        all.sum::<f64>() / shot.pixels() as f64
+    };
+    let run = |seed: u64, samples: u32, goal: Goal| {
+        let r = shot.render(seed, samples, goal);
+        (mean(&r), f64::from(r.samples))
+    };
+    let adaptive: Vec<_> = (0..seeds)
+        .into_par_iter()
+        .map(|s| run(s + 1000, 1 << 20, Goal::Error(goal)))
+        .collect();
+    let uniform: Vec<_> = (0..seeds)
+        .into_par_iter()
+        .map(|s| run(s + 5000, 96, Goal::Samples))
+        .collect();
+    let a = Moments::of(adaptive.iter().map(|r| r.0));
+    let b = Moments::of(uniform.iter().map(|r| r.0));
+    let z = (a.mean() - b.mean()) / a.standard_error().hypot(b.standard_error());
+    println!("{} {} z {z}", a.mean(), b.mean());
+    assert!(z.abs() < 3.5, "{z}");
+}
+
+/// Largest relative error of a tile, root mean square over its pixels, by the spread of renders with different seeds.
+fn worst_tile(all: &[Rendered]) -> f64 {
+    let n = all.len() as f64;
+    let film = &all[0].film;
+    let [w, h] = film.size();
+    let count = (w * h) as usize;
+    let estimates: Vec<Vec<f64>> = all
+        .iter()
+        .map(|r| (0..count).map(|i| r.film.estimate(i).mean[0]).collect())
+        .collect();
+    let level = estimates.iter().flatten().sum::<f64>() / n / count as f64;
+    let square = |i: usize| {
+        let m = Moments::of(estimates.iter().map(|e| e[i]));
+        let variance = m.standard_error().powi(2) * n;
+        variance / (m.mean() * m.mean() + 0.01 * level * level)
+    };
+    let window = [0, 0, w, h];
+    film.tiles()
+        .map(|t| t.indices(window).map(square).sum::<f64>() / t.pixels() as f64)
+        .fold(0.0, f64::max)
+        .sqrt()
+}
+
+/// Samples go where the error is: for the same largest error of a tile, as it is and not as it is stated, `--error` takes far fewer
+/// samples than a uniform render.
+#[test]
+fn adaptive_sampling_pays() {
+    let (size, seeds, goal) = if full() {
+        ([64, 48], 8, 0.1)
+    } else {
+        ([48, 32], 4, 0.12)
+    };
+    let shot = Shot::new("bench/cloud_sun.json", "pt", size);
+    let many = |first: u64, samples: u32, goal: Goal| -> Vec<Rendered> {
+        let seeds = (first..first + seeds).into_par_iter();
+        seeds.map(|s| shot.render(s, samples, goal)).collect()
+    };
+    let mean_samples = |all: &[Rendered]| -> f64 {
+        let of = |r: &Rendered| {
+            (0..shot.pixels())
+                .map(|i| f64::from(r.film.estimate(i).samples))
+                .sum::<f64>()
+        };
+        all.iter().map(of).sum::<f64>() / (all.len() * shot.pixels()) as f64
+    };
+    let adaptive = many(1, 1 << 20, Goal::Error(goal));
+    let uniform = many(100, 64, Goal::Samples);
+    let (a, u) = (worst_tile(&adaptive), worst_tile(&uniform));
+    // A uniform render's variance falls as the inverse of its samples.
+    let needed = 64.0 * (u / a).powi(2);
+    let gain = needed / mean_samples(&adaptive);
+    println!(
+        "goal {goal}: worst tile {a:.4} with {:.0} spp; uniform needs {needed:.0}: {gain:.2} times",
+        mean_samples(&adaptive)
+    );
+    assert!(a < 1.25 * goal, "{a}");
+    assert!(gain > 1.5, "{gain}");
+}
