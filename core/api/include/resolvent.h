@@ -343,6 +343,35 @@ typedef struct resolvent_param {
 /* A task of `resolvent_host.parallel_for`. */
 typedef void (*resolvent_task)(const void *data, size_t index);
 
+/* A right-handed orthonormal frame; `n` is the local z axis. */
+typedef struct resolvent_frame {
+  /* Local x axis. */
+  resolvent_float3 s;
+  /* Local y axis. */
+  resolvent_float3 t;
+  /* Local z axis. */
+  resolvent_float3 n;
+} resolvent_frame;
+
+/* A point on a surface, as a BSDF sees it. */
+typedef struct resolvent_surface_point {
+  /* Position. */
+  resolvent_float3 p;
+  /* Geometric normal, unit. */
+  resolvent_float3 ng;
+  /* Shading frame; `n` is the shading normal, `s` follows ∂p/∂u. */
+  struct resolvent_frame frame;
+  /* Texture coordinates. */
+  float uv[2];
+  /* Lanes in use. */
+  uint32_t lanes;
+  /* Index of refraction of what lies on the side that `ng` points to: 1 in vacuum, the outer medium's where dielectrics are
+   * nested. */
+  float outside_ior;
+  /* Linear colour and opacity that the mesh has here; white where it has none. Textures ask for it. Since minor version 2. */
+  float color[4];
+} resolvent_surface_point;
+
 /* Services of the host. */
 typedef struct resolvent_host {
   /* `sizeof(resolvent_host)`. */
@@ -361,6 +390,12 @@ typedef struct resolvent_host {
    * the texture coordinates `uv` to `out`: linear, clamped to the parameter's range, always finite. It takes no lock and
    * allocates nothing. Since minor version 1: there if `size` reaches it. */
   void (*texture)(void *ctx, const void *texture, const resolvent_float2 *uv, resolvent_float4 *out);
+  /* The same at a point of a surface: textures may depend on more of it than its texture coordinates (the colours of its mesh),
+   * which `resolvent_host.texture` takes for white. Since minor version 2: there if `size` reaches it. */
+  void (*texture_at)(void *ctx,
+                     const void *texture,
+                     const struct resolvent_surface_point *at,
+                     resolvent_float4 *out);
 } resolvent_host;
 
 /* What `create` is given. */
@@ -479,33 +514,6 @@ typedef struct resolvent_phase_table {
                               const struct resolvent_medium_point *at,
                               struct resolvent_closure *out);
 } resolvent_phase_table;
-
-/* A right-handed orthonormal frame; `n` is the local z axis. */
-typedef struct resolvent_frame {
-  /* Local x axis. */
-  resolvent_float3 s;
-  /* Local y axis. */
-  resolvent_float3 t;
-  /* Local z axis. */
-  resolvent_float3 n;
-} resolvent_frame;
-
-/* A point on a surface, as a BSDF sees it. */
-typedef struct resolvent_surface_point {
-  /* Position. */
-  resolvent_float3 p;
-  /* Geometric normal, unit. */
-  resolvent_float3 ng;
-  /* Shading frame; `n` is the shading normal, `s` follows ∂p/∂u. */
-  struct resolvent_frame frame;
-  /* Texture coordinates. */
-  float uv[2];
-  /* Lanes in use. */
-  uint32_t lanes;
-  /* Index of refraction of what lies on the side that `ng` points to: 1 in vacuum, the outer medium's where dielectrics are
-   * nested. */
-  float outside_ior;
-} resolvent_surface_point;
 
 /* Functions of a BSDF, see `RESOLVENT_BSDF_*`. */
 typedef struct resolvent_bsdf_table {
@@ -915,8 +923,9 @@ typedef struct resolvent_tile {
 typedef struct resolvent_output_table {
   /* `sizeof(resolvent_output_table)`. */
   uint32_t size;
-  /* Zero. */
-  uint32_t reserved;
+  /* How many layers of light by scattering order are wanted: layer k has the light scattered k times, the last one all that was
+   * scattered more often; 0: none. Since minor version 2, before which it was zero. */
+  uint32_t orders;
   /* Passed back to the functions. */
   void *ctx;
   /* Adds one sample of pixel (x, y). Samples of a pixel must come in order. */
@@ -924,6 +933,19 @@ typedef struct resolvent_output_table {
   /* Adds light to the film at position `film` (pixels), for walks that start at lights: every pixel receives it times the
    * value of its reconstruction filter there, divided by the number of samples of all pixels of the window together. */
   resolvent_status (*splat)(void *ctx, const resolvent_float2 *film, const resolvent_spectrum *radiance);
+  /* As `add`, with `layers`: the sample's radiance by scattering order, `orders` spectra that sum to it. Takes the place of `add`
+   * if `orders` is not 0. Since minor version 2: there if `size` reaches it. */
+  resolvent_status (*add_orders)(void *ctx,
+                                 uint32_t x,
+                                 uint32_t y,
+                                 const struct resolvent_pixel_sample *sample,
+                                 const resolvent_spectrum *layers);
+  /* As `splat`, for light that was scattered `order` times. Takes the place of `splat` if `orders` is not 0. Since minor
+   * version 2: there if `size` reaches it. */
+  resolvent_status (*splat_order)(void *ctx,
+                                  const resolvent_float2 *film,
+                                  const resolvent_spectrum *radiance,
+                                  uint32_t order);
 } resolvent_output_table;
 
 /* Functions of an integrator, see `Integrator`. */
