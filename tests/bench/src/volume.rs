@@ -17,7 +17,7 @@ pub struct Voxels<'a> {
     /// Edge of a voxel.
     pub size: f64,
     /// The value at a voxel; those that are not 0 are active.
-    pub value: &'a (dyn Fn([i32; 3]) -> f32),
+    pub value: &'a dyn Fn([i32; 3]) -> f32,
 }
 
 /// A round cloud of about `voxels` active voxels: a ball that thins out towards its rim, with waves in it.
