@@ -37,6 +37,8 @@ pub enum Command {
     Info(Info),
     /// Compare an image with a reference
     Compare(Compare),
+    /// Merge checkpoints of disjoint sample ranges into one picture
+    Merge(Merge),
     /// Measure time against error on the benchmark scenes
     #[cfg(feature = "bench")]
     Bench(Box<resolvent_bench::Options>),
@@ -52,7 +54,8 @@ Examples:
   resolvent render cloud.vdb --optical-thickness 20 --sun 1,0.3,0.5 --save-scene cloud.json
   resolvent render scene.json -o out.exr --time 60 --aov depth,variance
   resolvent render scene.json -o tile.exr --crop 0,0,320,180
-  resolvent render scene.json -o part2.exr --sample-range 64..128    (merge: mean of parts by samples)
+  resolvent render scene.json -o out.exr --spp 4096 --checkpoint out.ckpt --resume    (again after a crash)
+  resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt    (resolvent merge a.ckpt b.ckpt -o out.exr)
 
 Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once.";
 
@@ -73,7 +76,7 @@ pub struct Render {
     /// Sample for so many seconds
     #[arg(long, value_name = "S", value_parser = positive, group = "budget", help_heading = "Sampling")]
     pub time: Option<f64>,
-    /// Sample until the estimated relative error of the picture (root mean square) is at most this, such as 0.02
+    /// Sample every tile until its estimated relative error (root mean square) is at most this, such as 0.02
     #[arg(long, value_name = "E", value_parser = positive, group = "budget", help_heading = "Sampling")]
     pub error: Option<f64>,
     /// Take samples A up to, not including, B of every pixel's sequence; parts merge to one run
@@ -103,12 +106,13 @@ pub struct Render {
         help_heading = "Picture"
     )]
     pub aov: Vec<Layer>,
-    /// Exposure of PNG files, in stops
-    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, help_heading = "Picture")]
-    pub exposure: f64,
-    /// How PNG files bring large values into the display's range
-    #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic, help_heading = "Picture")]
-    pub tone_map: ToneCurve,
+    /// How PNG files are made
+    #[command(flatten)]
+    pub tone: Tone,
+
+    /// What is kept of the work
+    #[command(flatten)]
+    pub aim: Aim,
 
     /// What to choose instead of guessing, for VDB files and models
     #[command(flatten)]
@@ -126,6 +130,33 @@ pub struct Render {
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// How PNG files are made.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Picture")]
+pub struct Tone {
+    /// Exposure of PNG files, in stops
+    #[arg(long, value_name = "STOPS", value_parser = finite, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f64,
+    /// How PNG files bring large values into the display's range
+    #[arg(long, value_name = "CURVE", value_enum, default_value_t = ToneCurve::Filmic)]
+    pub tone_map: ToneCurve,
+}
+
+/// What is kept of the work.
+#[derive(Debug, ClapArgs)]
+#[command(next_help_heading = "Checkpoints")]
+pub struct Aim {
+    /// Keep the exact sums in this file: now and then while rendering, and at the end
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// Seconds between checkpoints: so much work may be lost by a crash
+    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 60.0, requires = "checkpoint")]
+    pub every: f64,
+    /// Go on from the checkpoint if there is one: the picture has the same bits as that of a render that was not interrupted
+    #[arg(long, requires = "checkpoint")]
+    pub resume: bool,
 }
 
 /// Options that replace guesses about a VDB file or a model.
@@ -301,10 +332,38 @@ pub struct Compare {
     pub json: bool,
 }
 
+/// Options of `merge`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent render scene.json --sample-range 0..64 --checkpoint a.ckpt\n  resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt\n  resolvent merge a.ckpt b.ckpt -o out.exr\n\nThe picture has the same bits as that of one render of all samples. Ranges that meet at multiples of 64 (of 128 from sample 1024 on, of 256 from 4096 on ...) divide no net: then this holds for the variance of bdpt and light as well, and for the chains of mlt, of which every part of a net has its own."
+)]
+pub struct Merge {
+    /// Checkpoints of the same scene, seed, integrator and layers
+    #[arg(required = true, value_name = "CHECKPOINT")]
+    pub checkpoints: Vec<PathBuf>,
+    /// Picture to write, .exr or .png; may be given several times
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "checkpoint"
+    )]
+    pub output: Vec<PathBuf>,
+    /// Write the sums as a checkpoint
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// How PNG files are made
+    #[command(flatten)]
+    pub tone: Tone,
+    /// Print only warnings and errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// Options of `plugin`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so"
+    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so\n  resolvent plugin new soft-ball --kind medium --lang rust\n  resolvent plugin check target/release/libmine.so --isolate"
 )]
 pub struct Plugin {
     /// What to do
@@ -335,6 +394,76 @@ pub enum PluginAction {
         #[command(flatten)]
         plugins: PluginPath,
     },
+    /// Write a complete plugin to start from: source, build file, test, scene
+    New(New),
+    /// Check that a plugin keeps the promises of its kind: statistics, edge cases, threads, memory
+    Check(Check),
+}
+
+/// Options of `plugin new`.
+#[derive(Debug, ClapArgs)]
+pub struct New {
+    /// The plugin's name, as in scenes
+    pub name: String,
+    /// What it is
+    #[arg(long, value_enum)]
+    pub kind: NewKind,
+    /// What it is written in
+    #[arg(long, value_enum, default_value_t = Language::Rust)]
+    pub lang: Language,
+    /// The folder to make [default: the name]
+    #[arg(long, value_name = "DIR")]
+    pub to: Option<PathBuf>,
+    /// Folder of resolvent-api, for Rust [default: that of the sources beside the program, or the published one]
+    #[arg(long, value_name = "DIR")]
+    pub api: Option<PathBuf>,
+}
+
+/// Kinds of plugins.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum NewKind {
+    /// What fills space
+    Medium,
+    /// How a surface scatters
+    Bsdf,
+    /// How a medium scatters
+    Phase,
+    /// How pictures are computed
+    Integrator,
+}
+
+/// Languages that there are templates in.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum Language {
+    /// Against the crate resolvent-api
+    Rust,
+    /// Against resolvent.h
+    C,
+}
+
+/// Options of `plugin check`.
+#[derive(Debug, ClapArgs)]
+pub struct Check {
+    /// A plugin's name, or the path of its library
+    pub plugin: String,
+    /// Parameters to check it with, as JSON; those that are not given are varied over their ranges
+    #[arg(long, value_name = "JSON")]
+    pub params: Option<String>,
+    /// Check in a process of its own, so that a crash or a hang is reported like any other fault
+    #[arg(long)]
+    pub isolate: bool,
+    /// Seconds without progress that count as a hang, with --isolate
+    #[arg(long, value_name = "S", default_value_t = 120)]
+    pub patience: u64,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Say every stage: for the process that --isolate starts
+    #[arg(long, hide = true)]
+    pub stages: bool,
+    /// Where to look first
+    #[command(flatten)]
+    pub plugins: PluginPath,
 }
 
 /// Options of `schema`.

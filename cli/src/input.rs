@@ -22,6 +22,13 @@ const VDB_MAGIC: [u8; 4] = [0x20, 0x42, 0x44, 0x56];
 /// First bytes of OpenEXR files.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
+/// True if a file begins like an OpenEXR image.
+pub fn is_exr(path: &Path) -> bool {
+    let mut first = [0; 4];
+    let read = std::fs::File::open(path).and_then(|mut f| f.read_exact(&mut first));
+    read.is_ok() && first == EXR_MAGIC
+}
+
 /// Tells the kind of a file by its name, or else by its first bytes.
 pub fn kind(path: &Path) -> Outcome<Kind> {
     let named = path

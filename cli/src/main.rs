@@ -6,6 +6,8 @@
 mod args;
 #[cfg(feature = "bench")]
 mod bench;
+mod checkpoint;
+mod check;
 mod compare;
 mod console;
 mod failure;
@@ -13,6 +15,7 @@ mod guess;
 mod info;
 mod input;
 mod interrupt;
+mod merge;
 mod output;
 mod overrides;
 mod plugin;
@@ -20,6 +23,7 @@ mod progress;
 mod render;
 mod stats;
 mod system;
+mod template;
 mod values;
 mod volume;
 
@@ -43,6 +47,7 @@ fn main() -> ExitCode {
         args::Command::Render(a) => render::run(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
+        args::Command::Merge(a) => merge::run(&a),
         #[cfg(feature = "bench")]
         args::Command::Bench(a) => bench::run(&a),
         args::Command::Plugin(a) => plugin::run(&a),

@@ -1,6 +1,6 @@
 //! Pictures: checked before rendering, made from the film after it.
 
-use crate::args::{Render, ToneCurve};
+use crate::args::{Tone, ToneCurve};
 use crate::failure::{Outcome, failed, input};
 use resolvent_engine::Rendered;
 use resolvent_engine::film::{Estimate, Features};
@@ -23,11 +23,11 @@ pub struct Target {
     format: Format,
 }
 
-/// The pictures asked for, or the default one; their folders can be written to.
-pub fn targets(a: &Render) -> Outcome<Vec<Target>> {
-    let mut paths = a.output.clone();
-    if paths.is_empty() {
-        let stem = a.input.file_stem().unwrap_or(a.input.as_os_str());
+/// The pictures asked for, or the default one for `input_file`; their folders can be written to.
+pub fn targets(asked: &[PathBuf], input_file: Option<&Path>) -> Outcome<Vec<Target>> {
+    let mut paths = asked.to_vec();
+    if let (true, Some(file)) = (paths.is_empty(), input_file) {
+        let stem = file.file_stem().unwrap_or(file.as_os_str());
         let path = PathBuf::from(stem).with_extension("exr");
         crate::console::info(format!("no -o given: writing {}", path.display()));
         paths.push(path);
@@ -86,13 +86,14 @@ pub fn check_writable(path: &Path) -> Outcome<()> {
     }
 }
 
-/// Refuses a picture that memory cannot hold, before the system ends the program for it.
-pub fn check_memory(window: [u32; 4], features: bool, layers: usize) -> Outcome<()> {
+/// Refuses a picture that memory cannot hold, before the system ends the program for it. `films` is how many times its sums are
+/// held.
+pub fn check_memory(window: [u32; 4], features: bool, layers: usize, films: usize) -> Outcome<()> {
     let pixels = u64::from(window[2] - window[0]) * u64::from(window[3] - window[1]);
     let sums = size_of::<resolvent_engine::film::Pixel>()
         + usize::from(features) * size_of::<resolvent_engine::film::FeatureSums>();
     // The picture is held as f32, and once more while it is written.
-    let need = pixels * (sums + 2 * 4 * (4 + 3 * layers)) as u64;
+    let need = pixels * (films * sums + 2 * 4 * (4 + 3 * layers)) as u64;
     match crate::system::available_memory() {
         Some(free) if need > free => Err(input(format!(
             "a picture of {} x {} pixels needs {} of memory, {} are free: render it in parts with --crop",
@@ -187,8 +188,18 @@ pub fn wants_features(scene: &Scene) -> bool {
     scene.film.aovs.iter().any(|a| first.contains(a))
 }
 
+/// Says which layers are left out.
+pub fn tell_missing(missing: &[Aov]) {
+    for layer in missing {
+        crate::console::info(format!(
+            "the layer '{}' is left out: it takes more samples to know it",
+            layer.name()
+        ));
+    }
+}
+
 /// Writes the picture to all targets.
-pub fn write(a: &Render, image: &Image, targets: &[Target]) -> Outcome<()> {
+pub fn write(a: &Tone, image: &Image, targets: &[Target]) -> Outcome<()> {
     let tone = ToneMap {
         exposure: a.exposure as f32,
         curve: match a.tone_map {
@@ -206,11 +217,13 @@ pub fn write(a: &Render, image: &Image, targets: &[Target]) -> Outcome<()> {
     Ok(())
 }
 
-/// The names of the targets, for messages.
-pub fn names(targets: &[Target]) -> String {
+/// The names of the targets, and of a checkpoint, for messages.
+pub fn names(targets: &[Target], checkpoint: Option<&Path>) -> String {
     let names: Vec<_> = targets
         .iter()
-        .map(|t| t.path.display().to_string())
+        .map(|t| t.path.as_path())
+        .chain(checkpoint)
+        .map(|p| p.display().to_string())
         .collect();
     names.join(", ")
 }

@@ -1,20 +1,21 @@
 //! `resolvent render`.
 
 use crate::args::Render;
+use crate::checkpoint::{self, Keeper};
 use crate::console;
 use crate::failure::{Code, Failure, Outcome, failed, input};
 use crate::input::Kind;
 use crate::interrupt::{self, Phase};
 use crate::output::{self, Target};
 use crate::overrides::{self, Plan};
-use crate::progress::{self, Display};
-use crate::stats::{self, Seconds};
+use crate::progress::Display;
+use crate::stats::{self, About, Certainty, Seconds};
 use resolvent_api::{Affine, PluginKind};
 use resolvent_engine::plugin::{ForeignIntegrator, Message, Registry, set_log};
 use resolvent_engine::scene::Scene;
-use resolvent_engine::{Rendered, Settings, with_threads};
+use resolvent_engine::{Goal, Keep, Rendered, Settings, go_on, with_threads};
 use resolvent_scene as describe;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Runs the command.
 pub fn run(a: &Render) -> Outcome {
@@ -25,10 +26,13 @@ pub fn run(a: &Render) -> Outcome {
         Message::Info(text) => console::info(text),
     });
     let kind = crate::input::kind(&a.input)?;
-    let targets = output::targets(a)?;
+    // Whoever keeps the sums needs no picture.
+    let default = a.aim.checkpoint.is_none().then_some(a.input.as_path());
+    let targets = output::targets(&a.output, default)?;
     for file in a.stats.iter().chain(&a.save_scene) {
         output::check_writable(file)?;
     }
+    checkpoint::check(&a.aim)?;
     with_threads(a.threads.into(), || work(a, kind, &targets)).map_err(input)?
 }
 
@@ -57,10 +61,21 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     }
     seconds.build(&built.preparation);
     let features = output::wants_features(&described);
-    output::check_memory(described.film.window(), features, described.film.aovs.len())?;
+    let keeper = Keeper::new(a, &described, &registry, &integrator)?;
+    let halves = 1 + usize::from(matches!(plan.goal, Goal::Error(_)));
+    let films = halves * (1 + usize::from(keeper.is_some()));
+    let layers = described.film.aovs.len();
+    output::check_memory(described.film.window(), features, layers, films)?;
 
     let cpu = crate::system::cpu_seconds().unwrap_or(0.0);
-    let rendered = render(&built, &integrator, &described, &plan);
+    let rendered = render(
+        &built,
+        &integrator,
+        &described,
+        &plan,
+        keeper.as_ref(),
+        a.aim.every,
+    )?;
     seconds.render_cpu = crate::system::cpu_seconds().unwrap_or(0.0) - cpu;
     interrupt::enter(Phase::Writing);
     let (rendered, broken) = match rendered {
@@ -83,17 +98,19 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         ));
     }
     let write_start = Instant::now();
-    let (mut image, missing) = output::image(&described, &rendered);
-    for layer in missing {
-        console::info(format!(
-            "the layer '{}' is left out: it takes more samples to know it",
-            layer.name()
-        ));
+    if let Some(keeper) = &keeper {
+        keeper.finish(&rendered)?;
     }
-    let error = rendered.film.relative_error();
-    let plain = rendered.samples;
-    image.metadata = stats::metadata(a, &described, &plan, &rendered, &integrator, error);
-    output::write(a, &image, targets)?;
+    let (mut image, missing) = output::image(&described, &rendered);
+    output::tell_missing(&missing);
+    let certainty = Certainty::of(&rendered.film);
+    certainty.warn(plan.goal);
+    let about = About {
+        input: a.input.display().to_string(),
+        integrator: integrator.title(),
+    };
+    image.metadata = stats::metadata(&about, &described, &rendered, &certainty);
+    output::write(&a.tone, &image, &targets)?;
     seconds.write = write_start.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
     if let Some(file) = &a.stats {
@@ -105,17 +122,14 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
             rendered: &rendered,
             plan: &plan,
             seconds,
-            error,
+            certainty: &certainty,
         };
         stats::write(&run, file)?;
     }
-    let error = error.map_or_else(String::new, |e| {
-        format!(", estimated error {}", progress::percent(e))
-    });
     let summary = format!(
-        "{} ({plain} spp{error}, {})",
-        output::names(targets),
-        progress::duration(rendered.seconds)
+        "{} ({})",
+        output::names(&targets, a.aim.checkpoint.as_deref()),
+        certainty.summary(&rendered)
     );
     if let Some(Failure { code, message }) = broken {
         return Err(Failure {
@@ -188,7 +202,9 @@ fn render(
     integrator: &ForeignIntegrator,
     described: &describe::Scene,
     plan: &Plan,
-) -> Result<Rendered, Box<resolvent_engine::Broken>> {
+    keeper: Option<&Keeper>,
+    every: f64,
+) -> Outcome<Result<Rendered, Box<resolvent_engine::Broken>>> {
     let settings = Settings {
         resolution: described.film.resolution,
         window: described.film.window(),
@@ -197,13 +213,25 @@ fn render(
         seed: described.sampling.seed,
         features: output::wants_features(described),
     };
+    let from = keeper.map_or(Ok(None), Keeper::load)?;
+    let save = |bytes: &[u8]| {
+        if let Some(keeper) = keeper {
+            keeper.save(bytes);
+        }
+    };
+    let keep = keeper.map(|k| Keep {
+        every: Duration::from_secs_f64(every.min(1e9)),
+        identity: &k.identity,
+        about: &k.about,
+        save: &save,
+    });
     let display = Display::new(plan.goal, plan.samples.len() as u32);
     interrupt::enter(Phase::Rendering);
-    let rendered = resolvent_engine::render(scene, integrator, &settings, &interrupt::STOP, &|p| {
-        display.report(p);
-    });
+    let stop = &interrupt::STOP;
+    let report = |p| display.report(p);
+    let rendered = go_on(from, scene, integrator, &settings, keep, stop, &report);
     display.finish();
-    rendered
+    Ok(rendered)
 }
 
 /// What may make the picture wrong.

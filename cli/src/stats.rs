@@ -1,9 +1,12 @@
 //! Figures about a run: `--stats`, and the metadata of pictures.
 
 use crate::args::Render;
+use crate::console;
 use crate::failure::{Outcome, failed};
 use crate::overrides::Plan;
-use resolvent_engine::plugin::{ForeignIntegrator, Registry};
+use crate::progress;
+use resolvent_engine::film::{Errors, Film, Interval};
+use resolvent_engine::plugin::Registry;
 use resolvent_engine::scene::{Preparation, Scene};
 use resolvent_engine::{Goal, Rendered};
 use resolvent_scene as describe;
@@ -57,8 +60,8 @@ pub struct Run<'r> {
     pub plan: &'r Plan,
     /// Times.
     pub seconds: Seconds,
-    /// Estimated relative error.
-    pub error: Option<f64>,
+    /// How certain it is.
+    pub certainty: &'r Certainty,
 }
 
 /// Samples taken over all pixels.
@@ -69,37 +72,125 @@ pub fn total_samples(rendered: &Rendered) -> u64 {
         .sum()
 }
 
+/// How certain a picture is.
+pub struct Certainty {
+    errors: Option<Errors>,
+    interval: Option<Interval>,
+}
+
+impl Certainty {
+    /// Of a film.
+    pub fn of(film: &Film) -> Self {
+        Self {
+            errors: film.errors(),
+            interval: film.interval(),
+        }
+    }
+
+    /// Says so if the error that ended the render is not to be trusted.
+    pub fn warn(&self, goal: Goal) {
+        if self.errors.is_some_and(|e| e.are_doubtful()) {
+            let text = "few pixels have most of the estimated error: light that is rare and bright may be missing, and the true error be larger than stated";
+            match goal {
+                Goal::Error(_) => console::warning(text),
+                _ => console::info(text),
+            }
+        }
+    }
+
+    /// For people: samples, error, time.
+    pub fn summary(&self, rendered: &Rendered) -> String {
+        let mut text = spp(rendered);
+        if let Some(e) = self.errors {
+            text += &format!(
+                ", estimated error {}, worst tile {}",
+                progress::percent(e.picture),
+                progress::percent(e.worst_tile)
+            );
+        }
+        text + &format!(", {}", progress::duration(rendered.seconds))
+    }
+}
+
+/// Samples per pixel for people.
+fn spp(rendered: &Rendered) -> String {
+    let [low, mean, high] = samples(rendered);
+    if low == high {
+        format!("{low} spp")
+    } else {
+        format!("{low} to {high} spp, on average {mean:.0}")
+    }
+}
+
+/// Samples per pixel: the least, the mean, the most.
+fn samples(rendered: &Rendered) -> [f64; 3] {
+    let film = &rendered.film;
+    let [w, h] = film.size();
+    let count = w as usize * h as usize;
+    let all = (0..count).map(|i| f64::from(film.estimate(i).samples));
+    let (low, sum, high) = all.fold((f64::INFINITY, 0.0, 0f64), |(low, sum, high), n| {
+        (low.min(n), sum + n, high.max(n))
+    });
+    [low, sum / count.max(1) as f64, high]
+}
+
+/// What a picture was made from.
+pub struct About {
+    /// The file that was rendered.
+    pub input: String,
+    /// The integrator as errors name it.
+    pub integrator: String,
+}
+
 /// What pictures say about how they were made.
 pub fn metadata(
-    a: &Render,
+    about: &About,
     scene: &describe::Scene,
-    plan: &Plan,
     rendered: &Rendered,
-    integrator: &ForeignIntegrator,
-    error: Option<f64>,
+    certainty: &Certainty,
 ) -> BTreeMap<String, String> {
     let version = env!("CARGO_PKG_VERSION");
-    let first = plan.samples.start;
-    let mut all = BTreeMap::from([
-        ("software".to_owned(), format!("resolvent {version}")),
-        ("version".to_owned(), version.to_owned()),
-        ("scene".to_owned(), a.input.display().to_string()),
-        ("seed".to_owned(), scene.sampling.seed.to_string()),
-        ("samples".to_owned(), rendered.samples.to_string()),
-        (
-            "sample_range".to_owned(),
-            format!("{first}..{}", first + rendered.samples),
-        ),
-        ("integrator".to_owned(), integrator.title()),
-        ("seconds".to_owned(), format!("{:.3}", rendered.seconds)),
-    ]);
-    if let Some(e) = error {
-        all.insert("estimated_error".to_owned(), format!("{e:.6}"));
+    let mut all = BTreeMap::new();
+    let mut put = |key: &str, value: String| drop(all.insert(key.to_owned(), value));
+    put("software", format!("resolvent {version}"));
+    put("version", version.to_owned());
+    put("scene", about.input.clone());
+    put("seed", scene.sampling.seed.to_string());
+    put("samples", rendered.samples.to_string());
+    put("integrator", about.integrator.clone());
+    put("seconds", format!("{:.3}", rendered.seconds));
+    match &rendered.adaptive {
+        Some(adaptive) => put("error_goal", adaptive.goal().to_string()),
+        None => put("sample_range", sample_range(&rendered.film)),
+    }
+    let [low, mean, high] = samples(rendered);
+    if low < high {
+        put("mean_samples", format!("{mean:.3}"));
+        put("most_samples", high.to_string());
+    }
+    if let Some(e) = certainty.errors {
+        put("estimated_error", format!("{:.6}", e.picture));
+        put("worst_tile_error", format!("{:.6}", e.worst_tile));
+        put("error_is_doubtful", e.are_doubtful().to_string());
+    }
+    if let Some(i) = certainty.interval {
+        let three = |v: [f64; 3]| v.map(|x| format!("{x:e}")).join(" ");
+        put("mean", three(i.mean));
+        put("mean_error_95", three(i.half_width));
     }
     if rendered.interrupted {
-        all.insert("interrupted".to_owned(), "true".to_owned());
+        put("interrupted", "true".to_owned());
     }
     all
+}
+
+/// The samples that every pixel has.
+fn sample_range(film: &Film) -> String {
+    let tiles = 0..film.tiles().len();
+    tiles
+        .map(|i| film.coverage(i))
+        .min_by_key(|c| c.samples())
+        .map_or_else(String::new, ToString::to_string)
 }
 
 /// Writes the figures.
@@ -121,6 +212,8 @@ fn figures(run: &Run) -> Value {
     let r = run.rendered;
     let c = &r.counters;
     let s = &run.seconds;
+    let errors = run.certainty.errors;
+    let [_, mean_samples, most_samples] = samples(r);
     json!({
         "resolvent": env!("CARGO_PKG_VERSION"),
         "input": run.args.input,
@@ -136,8 +229,10 @@ fn figures(run: &Run) -> Value {
         },
         "sampling": {
             "seed": run.described.sampling.seed,
-            "sample_range": [run.plan.samples.start, run.plan.samples.start + r.samples],
+            "sample_range": r.adaptive.is_none().then(|| sample_range(&r.film)),
             "samples_per_pixel": r.samples,
+            "mean_samples_per_pixel": mean_samples,
+            "most_samples_per_pixel": most_samples,
             "samples": total_samples(r),
             "goal": match run.plan.goal {
                 Goal::Samples => json!({"samples": run.plan.samples.len()}),
@@ -145,7 +240,14 @@ fn figures(run: &Run) -> Value {
                 Goal::Error(e) => json!({"error": e}),
             },
             "interrupted": r.interrupted,
-            "estimated_error": run.error,
+            "estimated_error": errors.map(|e| e.picture),
+            "worst_tile_error": errors.map(|e| e.worst_tile),
+            "error_is_doubtful": errors.map(|e| e.are_doubtful()),
+            "mean": run.certainty.interval.map(|i| json!({
+                "value": i.mean,
+                "error_95": i.half_width,
+                "degrees_of_freedom": i.degrees.is_finite().then_some(i.degrees),
+            })),
         },
         "counts": {
             "rays": c.rays,

@@ -44,6 +44,9 @@ pub mod bsdf_traits {
     pub const NULL: u32 = 1;
     /// The same at every point.
     pub const UNIFORM: u32 = 2;
+    /// f(wo, wi) ≠ η² f(wi, wo), on purpose: measured or artistic. Walks from lights and from the sensor see different
+    /// materials then, so integrators that join them disagree with those that don't. Since minor version 2.
+    pub const NON_RECIPROCAL: u32 = 4;
 }
 
 /// A BSDF plugin: textures are looked up once per vertex, the closure is what gets evaluated and sampled.

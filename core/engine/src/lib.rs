@@ -1,9 +1,11 @@
 //! Resolvent's host: from a scene's description to a film.
 //!
 //! [`plugin`] finds and loads plugins, [`scene`] builds and plans the scene and is G for the integrators, [`geometry`] traces rays,
-//! [`light`] has the lights, [`mod@texture`] the images, [`film`] the sums, [`render()`] divides the work. The engine never names a concrete plugin.
+//! [`light`] has the lights, [`mod@texture`] the images, [`film`] the sums, [`render()`] divides the work,
+//! [`checkpoint`] keeps it. The engine never names a concrete plugin.
 
 mod camera;
+pub mod checkpoint;
 mod error;
 pub mod film;
 mod filter;
@@ -15,4 +17,4 @@ pub mod scene;
 pub mod texture;
 
 pub use error::{Error, Result};
-pub use render::{Broken, Goal, Progress, Rendered, Settings, render, with_threads};
+pub use render::{Broken, Goal, Keep, Progress, Rendered, Settings, go_on, render, with_threads};

@@ -12,6 +12,7 @@ pub mod chain;
 pub mod features;
 pub mod measure;
 pub mod mis;
+pub mod nets;
 pub mod roulette;
 pub mod sampler;
 pub mod samples;

@@ -1,18 +1,15 @@
 //! The primary samples of a path: Owen-scrambled Sobol' for the first bounces, hashed numbers beyond.
 //!
-//! Samples come in randomised nets of `sobol::NET`, which are independent of each other. Every aligned batch of
-//! [`BATCH`] of them is a net too, and the spread of batches is what errors are estimated from: as if they were independent. In
-//! fact they complement each other, and the mean of many is better than that: the estimate errs on the safe side (measured on
-//! bench/surface_only: 1.3 times the variance at 32 samples, 1.6 times at 256; on bench/box_fog 1.0). Every number is a function of (seed, pixel, sample, bounce, purpose) alone.
+//! Samples come in [`nets`] that are scrambled independently of each other: the spread of nets is what errors are estimated from.
+//! Every number is a function of (seed, pixel, sample, bounce, purpose) alone.
 //!
-//! A direction and the point on a light that is connected to where it leads share one four-dimensional net: together they are
-//! the integral that a bounce adds.
+//! The first two directions of a walk share one four-dimensional net: light scattered three times is an integral over both. (On
+//! bench/surface_only that errs by 4 % less than nets of a direction and the point on a light that is connected to where it leads,
+//! which is how the numbers of later bounces are laid out.)
 
-use crate::sobol::{self, NET};
+use crate::{nets, sobol};
 use resolvent_api::rng::{derive, mix, unit};
 use resolvent_api::{FlightDraws, ScatterDraws, Spectrum};
-
-pub use crate::sobol::BATCH;
 
 /// Bounces whose decisions use the net. Later ones gain nothing from it (their integrand has too many dimensions).
 const NET_BOUNCES: u32 = 2;
@@ -49,19 +46,38 @@ pub struct Sampler {
     flights: bool,
 }
 
+/// The numbers of one vertex of a walk.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounce {
+    /// Chooses a light to connect to.
+    pub choice: f32,
+    /// Chooses the point on it.
+    pub point: [f32; 2],
+    /// For the roulette of the connection.
+    pub chance: f32,
+    /// Chooses the direction to go on in.
+    pub scatter: ScatterDraws,
+    /// For the roulette of the walk.
+    pub roulette: f32,
+    /// For the vertex in that direction.
+    pub next: [f32; 2],
+}
+
 impl Sampler {
     /// The numbers of sample `sample` of pixel `pixel` of the image `seed`, for `lanes` lanes in use.
     #[inline(always)]
     pub fn new(seed: u64, pixel: u64, sample: u32, lanes: u32) -> Self {
         let pixel_key = derive(mix(seed ^ 0x5eed), pixel);
-        let net_key = derive(pixel_key, u64::from(sample / NET));
-        let sample_key = derive(net_key, 0x1_0000 + u64::from(sample % NET));
-        // One lane after the other from a random start: within a batch every lane leads about equally often.
-        let hero = (((net_key >> 40) as u32).wrapping_add(sample % NET)) % lanes;
+        let begin = nets::around(sample).start;
+        let index = sample - begin;
+        let net_key = derive(pixel_key, u64::from(begin));
+        let sample_key = derive(net_key, 0x1_0000 + u64::from(index));
+        // One lane after the other from a random start: within a net every lane leads about equally often.
+        let hero = (((net_key >> 40) as u32).wrapping_add(index)) % lanes;
         Self {
             net_key,
             sample_key,
-            index: sample % NET,
+            index,
             lanes,
             hero,
             flights: true,
@@ -142,6 +158,33 @@ impl Sampler {
         }
     }
 
+    /// The numbers of the vertex after `bounce` bounces. `shared` is [`Bounce::next`] of the vertex before, at the first one
+    /// [`Sampler::first_point`].
+    #[inline(always)]
+    pub fn bounce(&self, bounce: u32, shared: [f32; 2]) -> Bounce {
+        let [choice, chance, lobe, roulette] = self.four(bounce, Purpose::Light);
+        let [x, y, a, b] = self.four(bounce, Purpose::Scatter);
+        let (dir, point) = if bounce == 1 {
+            (shared, [x, y])
+        } else {
+            ([x, y], shared)
+        };
+        Bounce {
+            choice,
+            point,
+            chance,
+            scatter: ScatterDraws { lobe, dir },
+            roulette,
+            next: [a, b],
+        }
+    }
+
+    /// The point on a light that the first vertex is connected to.
+    #[inline(always)]
+    pub fn first_point(&self) -> [f32; 2] {
+        self.two(0, Purpose::Camera, true)
+    }
+
     /// Film offset within the pixel and lens position.
     #[inline(always)]
     pub fn camera(&self) -> ([f32; 2], [f32; 2]) {
@@ -189,14 +232,6 @@ impl Sampler {
         }
     }
 
-    /// A scattering decision, and a number for the roulette before it.
-    #[inline(always)]
-    pub fn scatter(&self, bounce: u32) -> (ScatterDraws, f32) {
-        let dir = self.two(bounce, Purpose::Scatter, false);
-        let [lobe, chance] = self.two(bounce, Purpose::Light, true);
-        (ScatterDraws { lobe, dir }, chance)
-    }
-
     /// Whether a branch leaves the path, and its direction.
     #[inline(always)]
     pub fn branching(&self, bounce: u32) -> (f32, ScatterDraws) {
@@ -208,17 +243,6 @@ impl Sampler {
                 dir: [a, b],
             },
         )
-    }
-
-    /// Choice of a light, a point on it, and a number for the roulette of the connection.
-    #[inline(always)]
-    pub fn light(&self, bounce: u32) -> (f32, [f32; 2], f32) {
-        let [choice, chance] = self.two(bounce, Purpose::Light, false);
-        let point = match bounce {
-            0 => self.two(0, Purpose::Camera, true),
-            _ => self.two(bounce - 1, Purpose::Scatter, true),
-        };
-        (choice, point, chance)
     }
 }
 
@@ -234,8 +258,18 @@ mod tests {
         let a = Sampler::new(7, 123, 45, 3);
         let b = Sampler::new(7, 123, 45, 3);
         let c = Sampler::new(7, 124, 45, 3);
-        assert_eq!(a.light(3), b.light(3));
-        assert_ne!(a.light(3), c.light(3));
+        let numbers = |s: Sampler, bounce| {
+            let b = s.bounce(bounce, s.first_point());
+            let ScatterDraws { lobe, dir } = b.scatter;
+            [
+                b.choice, b.chance, b.roulette, lobe, b.point[0], dir[0], dir[1], b.next[1],
+            ]
+        };
+        for bounce in [0, 3] {
+            assert_eq!(numbers(a, bounce), numbers(b, bounce));
+            let (x, y) = (numbers(a, bounce), numbers(c, bounce));
+            assert!(x.iter().zip(y).all(|(x, y)| *x != y), "{x:?} {y:?}");
+        }
         assert_ne!(a.camera(), c.camera());
         assert_ne!(
             a.flight(0, Spectrum::ONE).key,

@@ -1,20 +1,18 @@
 //! Four-dimensional Owen-scrambled Sobol' points (Owen 1995; hashing after Burley 2020, "Practical Hash-based Owen
 //! Scrambling").
 //!
-//! A net has [`NET`] points; their order is shuffled by a nested uniform scramble of the index from its highest bit down, so that
-//! any aligned power of two of them, [`BATCH`] for one, is a net as well. (From the lowest bit up the lowest bits would hardly
+//! A net has up to [`POINTS`] points; their order is shuffled by a nested uniform scramble of the index from its highest bit down, so
+//! that any aligned power of two of them is a net as well. (From the lowest bit up the lowest bits would hardly
 //! be shuffled at all, and with them the highest bits of nets of different keys would be tied together: that was measured to
 //! double the error.)
 
 use resolvent_api::rng::mix;
 
-/// Points of a net.
-pub const NET: u32 = 1 << LOG_NET;
+/// Most points of a net.
+pub const POINTS: u32 = 1 << LOG_NET;
 const LOG_NET: u32 = 12;
-/// Points of the least part of a net that errors are estimated from.
-pub const BATCH: u32 = 16;
 
-/// Direction numbers of the first four Sobol' dimensions for indices below [`NET`].
+/// Direction numbers of the first four Sobol' dimensions for indices below [`POINTS`].
 /// Primitive polynomials and initial numbers: Joe & Kuo 2008 (new-joe-kuo-6.21201), dimensions 1-4.
 const DIRECTIONS: [[u32; LOG_NET as usize]; 4] = directions();
 
@@ -107,7 +105,7 @@ fn plain(index: u32, key: u64) -> [u32; 4] {
     [0, 1, 2, 3].map(|dim| low[dim] ^ high[dim])
 }
 
-/// Point `index` (below [`NET`]) of the net `key`.
+/// Point `index` (below [`POINTS`]) of the net `key`.
 #[inline(always)]
 pub fn point(index: u32, key: u64) -> [u32; 4] {
     let x = plain(index, key);
@@ -144,12 +142,12 @@ mod tests {
             let key = resolvent_api::rng::mix(key);
             for log in [4, 6, 9, LOG_NET] {
                 let n = 1u32 << log;
-                for begin in [0, n, NET / 2, NET - n] {
+                for begin in [0, n, POINTS / 2, POINTS - n] {
                     for a in 0..=log {
                         let b = log - a;
                         let mut seen = vec![0; n as usize];
                         for i in begin..begin + n {
-                            let p = point(i % NET, key);
+                            let p = point(i % POINTS, key);
                             let x = p[0].checked_shr(32 - a).unwrap_or(0);
                             let y = p[1].checked_shr(32 - b).unwrap_or(0);
                             seen[((x << b) | y) as usize] += 1;
@@ -167,7 +165,7 @@ mod tests {
 
     #[test]
     fn halves_are_those_of_the_point() {
-        for index in [0, 1, 77, NET - 1] {
+        for index in [0, 1, 77, POINTS - 1] {
             for key in [3, u64::MAX / 7] {
                 let [a, b, c, d] = point(index, key);
                 assert_eq!(half(index, key, false), [a, b]);

@@ -45,6 +45,44 @@ fn target(path: &Path) -> Result<PathBuf, Error> {
     }
 }
 
+/// Removes what writers of `path` left that were ended while they wrote it.
+///
+/// A temporary file's name has the number of its process, and files of processes that run stay. Where that cannot be told, all
+/// stay. Nothing is reported: it is only tidying.
+pub fn remove_leftovers(path: impl AsRef<Path>) {
+    let processes = Path::new("/proc");
+    let Ok(target) = target(path.as_ref()) else {
+        return;
+    };
+    let folder = target.parent().unwrap_or(Path::new(""));
+    let (Some(name), Ok(files)) = (target.file_name(), std::fs::read_dir(display(folder))) else {
+        return;
+    };
+    if !processes.join(std::process::id().to_string()).exists() {
+        return;
+    }
+    let prefix = format!(".{}.", shown(name));
+    for file in files.flatten() {
+        let name = file.file_name().to_string_lossy().into_owned();
+        let middle = name
+            .strip_prefix(&prefix)
+            .and_then(|n| n.strip_suffix(".tmp"));
+        let numbers = middle.and_then(|m| m.split_once('-'));
+        if let Some((process, count)) = numbers
+            && process.parse::<u32>().is_ok()
+            && count.parse::<u32>().is_ok()
+            && !processes.join(process).exists()
+        {
+            let _ = std::fs::remove_file(file.path());
+        }
+    }
+}
+
+/// What a temporary file's name has of the target's: long names stay within the 255 bytes that file systems have.
+fn shown(name: &std::ffi::OsStr) -> String {
+    name.to_string_lossy().chars().take(40).collect()
+}
+
 /// A new file whose name no other process and no other thread uses.
 fn create_beside(path: &Path, target: &Path) -> Result<(File, PathBuf), Error> {
     static COUNTER: AtomicU32 = AtomicU32::new(0);
@@ -54,8 +92,7 @@ fn create_beside(path: &Path, target: &Path) -> Result<(File, PathBuf), Error> {
     let folder = target.parent().unwrap_or(Path::new(""));
     loop {
         let mut temporary = std::ffi::OsString::from(".");
-        // Long names stay within the 255 bytes that file systems have.
-        let shown: String = name.to_string_lossy().chars().take(40).collect();
+        let shown = shown(name);
         let number = COUNTER.fetch_add(1, Ordering::Relaxed);
         temporary.push(format!("{shown}.{}-{number}.tmp", std::process::id()));
         let temporary = folder.join(temporary);

@@ -1,6 +1,7 @@
 //! The program as a user runs it: every test starts the real binary.
 
 mod bench;
+mod checkpoint;
 mod determinism;
 mod errors;
 mod hostile;

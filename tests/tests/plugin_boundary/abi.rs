@@ -181,15 +181,24 @@ fn of_another_architecture() {
         183
     };
     library[18..20].copy_from_slice(&other.to_ne_bytes());
-    refused(
-        &file("foreign", &library),
-        &["is no shared library that can be loaded here"],
-    );
-    // 32 bits.
+    let (other, own) = if cfg!(target_arch = "aarch64") {
+        ("x86-64", "AArch64")
+    } else {
+        ("AArch64", "x86-64")
+    };
+    let words = format!("it was built for {other}, and this is {own}");
+    refused(&file("foreign", &library), &[&words]);
+    // 32 bits, for a processor nobody has heard of.
     library[4] = 1;
+    library[18..20].copy_from_slice(&999u16.to_ne_bytes());
     refused(
         &file("narrow", &library),
-        &["is no shared library that can be loaded here"],
+        &["it was built for processor 999"],
+    );
+    refused(&file("dll", b"MZ and so on"), &["it was built for Windows"]);
+    refused(
+        &file("dylib", b"\xcf\xfa\xed\xfe"),
+        &["it was built for macOS"],
     );
 }
 
@@ -256,13 +265,20 @@ fn the_first_in_the_search_path_wins() {
             "was built for plugin ABI 2.0",
         ],
     );
-    let listed: Vec<_> = registry_before(&[two.clone(), one, broken])
+    let listed: Vec<_> = registry_before(&[two.clone(), one.clone(), broken])
         .available()
         .into_iter()
         .filter(|(kind, name, _)| *kind == PluginKind::Phase && name == "linear")
         .map(|(.., path)| path)
         .collect();
     assert_eq!(listed, [two.join(&library)]);
+    // Those that are never used are known.
+    let found = registry_before(&[two.clone(), one.clone(), two.clone()]).found();
+    let linear = found.iter().find(|f| f.name == "linear");
+    assert_eq!(
+        linear.map(|f| &f.hides[..]),
+        Some(&[one.join(&library)][..])
+    );
 }
 
 /// A name that is nowhere: the nearest, all that are known, and where they were sought.

@@ -92,7 +92,7 @@ fn layouts_agree() {
             "params" = params, "param_count" = param_count, "param_size" = param_size, "table" = table
         },
         "param_decl": ParamDecl {
-            "default_json" = default, "choices" = choices, "min" = min, "kind" = kind, "flags" = flags
+            "default_" = default, "choices" = choices, "min" = min, "kind" = kind, "flags" = flags
         },
         "param": ParamValue {
             "kind" = kind, "count" = count, "numbers" = numbers, "text" = text, "header" = header, "instance" = instance

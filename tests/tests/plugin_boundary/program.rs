@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// The program, two folders above the tests' executables.
-fn program() -> PathBuf {
+pub fn program() -> PathBuf {
     let exe = std::env::current_exe().unwrap_or_else(|e| panic!("{e}"));
     let folder = exe
         .parent()

@@ -12,6 +12,8 @@ use core::f32::consts::FRAC_1_PI;
 /// Deviation of refracted rays below which a rough boundary counts as smooth: half vectors of directions in single precision
 /// say nothing about it.
 const UNBENT: f32 = 2e-5;
+/// Cosine below which a direction lies in the surface: two of them would leave the range of `f32` in f's denominator.
+const GRAZING: f32 = 1e-30;
 
 /// A boundary that absorbs nothing.
 ///
@@ -163,7 +165,7 @@ impl Interface {
     /// Value (per power, sr⁻¹) and densities; all zero if smooth.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> ScatterEval {
-        if self.smooth || wo.z == 0.0 || wi.z == 0.0 {
+        if self.smooth || wo.z.abs() < GRAZING || wi.z.abs() < GRAZING {
             return ScatterEval::default();
         }
         let t = self.turn(wo, wi);

@@ -1,49 +1,29 @@
 //! The film: sums per pixel in fixed point, so that they do not depend on the order of addition.
 //!
 //! Every sample is rounded once, to a multiple of 2⁻⁶⁴, and added as an integer. Any division of the work into tiles, sample
-//! ranges, threads or machines gives the same bits.
+//! ranges, threads or machines gives the same bits. Errors are estimated from the spread of [`nets`], which are independent; the
+//! parts of a net that is cut by a sample range count as a net of their own until the rest arrives.
 
+mod buffer;
+mod coverage;
+mod error;
+mod fixed;
 mod splat;
+mod store;
+mod tile;
 
+pub use buffer::{Buffer, FeatureSums};
+pub use coverage::Coverage;
+pub use error::{Errors, Interval, student};
 pub use splat::Splats;
+pub use tile::{Rect, TILE};
 
 use crate::filter::Filter;
-use resolvent_api::Spectrum;
-use resolvent_api::abi::PixelSample;
-use resolvent_pathspace::sampler::BATCH;
-
-/// Fractional bits of the sums.
-const FRACTION: i32 = 64;
-/// Largest magnitude a single value may have; beyond, it is rejected like an infinity. Leaves room for 2²³ samples.
-const LARGEST: f32 = 1e12;
-
-/// Rounds toward zero to fixed point. The value must be finite and not beyond [`LARGEST`].
-#[inline(always)]
-fn fix(v: f32) -> i128 {
-    let bits = v.to_bits();
-    let exponent = (bits >> 23 & 0xff) as i32;
-    let mantissa = i128::from(if exponent == 0 {
-        0
-    } else {
-        bits & 0x7f_ffff | 0x80_0000
-    });
-    let shift = exponent - 150 + FRACTION;
-    let magnitude = if shift >= 0 {
-        mantissa << shift
-    } else {
-        mantissa >> (-shift).min(127)
-    };
-    if bits >> 31 == 0 {
-        magnitude
-    } else {
-        -magnitude
-    }
-}
-
-/// Back to floating point.
-fn float(v: i128) -> f64 {
-    v as f64 * (0.5f64).powi(FRACTION)
-}
+use fixed::{Squares, add, float};
+use resolvent_pathspace::nets;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use tile::{Part, TileSums};
 
 /// Sums of one pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,152 +32,26 @@ pub struct Pixel {
     sum: [i128; 3],
     /// Coverage.
     alpha: i128,
-    /// Σ over batches of (sum of the batch)²/samples of the batch.
-    squares: [f64; 3],
-    samples: u32,
-    batches: u32,
-}
-
-/// Sums of one pixel's features.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FeatureSums {
-    depth: i128,
-    hits: u32,
-    albedo: [i128; 3],
-    normal: [i128; 3],
-}
-
-/// A rectangle of pixels that one worker fills.
-pub struct Buffer {
-    min: [u32; 2],
-    width: u32,
-    pixels: Vec<Pixel>,
-    features: Vec<FeatureSums>,
-    /// Sums of the batch in progress, of the pixel in progress.
-    batch: [i128; 3],
-    in_batch: u32,
-    current: Option<(u32, u32)>,
-    first_sample: u32,
-    /// Light from walks that started at lights.
-    pub splats: Splats,
-    /// Samples that were left out.
-    pub rejected: u64,
-    /// Where the first of them was.
-    pub rejected_at: Option<[u32; 2]>,
-}
-
-impl Buffer {
-    /// An empty buffer for pixels from `min` up to, not including, `max`, for samples from `first_sample` on.
-    pub fn new(min: [u32; 2], max: [u32; 2], first_sample: u32, features: bool) -> Self {
-        let width = max[0] - min[0];
-        let count = (width * (max[1] - min[1])) as usize;
-        Self {
-            min,
-            width,
-            pixels: vec![Pixel::default(); count],
-            features: if features {
-                vec![FeatureSums::default(); count]
-            } else {
-                Vec::new()
-            },
-            batch: [0; 3],
-            in_batch: 0,
-            current: None,
-            first_sample,
-            splats: Splats::default(),
-            rejected: 0,
-            rejected_at: None,
-        }
-    }
-
-    /// Adds the next sample of pixel (x, y). A sample that is not finite counts as taken and black, and is reported.
-    #[inline]
-    pub fn add(&mut self, x: u32, y: u32, s: &PixelSample) -> Result<(), String> {
-        let (column, row) = (x.wrapping_sub(self.min[0]), y.wrapping_sub(self.min[1]));
-        let index = (row as usize) * (self.width as usize) + column as usize;
-        if column >= self.width || index >= self.pixels.len() {
-            return Err(format!(
-                "added a sample to pixel ({x}, {y}), which is not in its tile"
-            ));
-        }
-        if self.current != Some((x, y)) {
-            self.end_batch();
-            self.current = Some((x, y));
-        }
-        let good = s.radiance.0[..3]
-            .iter()
-            .all(|v| v.is_finite() && v.abs() <= LARGEST)
-            && s.alpha.is_finite();
-        let radiance = if good { s.radiance } else { Spectrum::ZERO };
-        if !good {
-            self.rejected += 1;
-            self.rejected_at.get_or_insert([x, y]);
-        }
-        let p = &mut self.pixels[index];
-        for lane in 0..3 {
-            let v = fix(radiance[lane]);
-            p.sum[lane] += v;
-            self.batch[lane] += v;
-        }
-        p.alpha += fix(if good { s.alpha } else { 0.0 });
-        p.samples += 1;
-        self.in_batch += 1;
-        if (self.first_sample + p.samples).is_multiple_of(BATCH) {
-            self.end_batch();
-            self.current = Some((x, y));
-        }
-        if let Some(f) = self.features.get_mut(index)
-            && s.depth > 0.0
-            && s.depth <= LARGEST
-        {
-            f.depth += fix(s.depth);
-            f.hits += 1;
-            for i in 0..3 {
-                f.albedo[i] += fix(s.albedo[i]);
-                f.normal[i] += fix(s.normal[i]);
-            }
-        }
-        Ok(())
-    }
-
-    /// The first pixel that has not exactly `count` samples, with what it has.
-    pub fn uneven(&self, count: u32) -> Option<([u32; 2], u32)> {
-        let i = self.pixels.iter().position(|p| p.samples != count)?;
-        let at = [
-            self.min[0] + i as u32 % self.width,
-            self.min[1] + i as u32 / self.width,
-        ];
-        Some((at, self.pixels[i].samples))
-    }
-
-    fn end_batch(&mut self) {
-        if let Some((x, y)) = self.current
-            && self.in_batch > 0
-        {
-            let index = ((y - self.min[1]) * self.width + (x - self.min[0])) as usize;
-            let p = &mut self.pixels[index];
-            for lane in 0..3 {
-                let sum = float(self.batch[lane]);
-                p.squares[lane] += sum * sum / f64::from(self.in_batch);
-            }
-            p.batches += 1;
-        }
-        self.batch = [0; 3];
-        self.in_batch = 0;
-        self.current = None;
-    }
+    /// Σ over nets of (sum of the net)²/samples of the net.
+    squares: [Squares; 3],
 }
 
 /// The sums of a whole image.
+#[derive(Clone, Debug)]
 pub struct Film {
     /// Window that is rendered: x0, y0, x1, y1 in pixels of the full image.
     window: [u32; 4],
     pixels: Vec<Pixel>,
     features: Vec<FeatureSums>,
+    tiles: Vec<TileSums>,
+    /// Parts of nets, by tile and first sample of the net.
+    parts: BTreeMap<(usize, u32), Part>,
     /// Light from walks that started at lights, once there is any.
     splats: Option<splat::Sums>,
     /// Pieces of work merged, and their samples.
     pieces: (u64, u64),
+    /// The other half of an adaptive render: the picture is the mean of both.
+    twin: Option<Box<Film>>,
 }
 
 /// One pixel's estimates.
@@ -205,12 +59,14 @@ pub struct Film {
 pub struct Estimate {
     /// Mean radiance.
     pub mean: [f64; 3],
-    /// Variance of that mean; `None` with fewer than two batches.
+    /// Variance of that mean; `None` with fewer than two nets.
     pub variance: Option<[f64; 3]>,
     /// Mean coverage.
     pub alpha: f64,
     /// Samples taken.
     pub samples: u32,
+    /// Degrees of freedom of the variance.
+    pub degrees: u32,
 }
 
 /// One pixel's features: means over the samples that met something.
@@ -236,8 +92,52 @@ impl Film {
             } else {
                 Vec::new()
             },
+            tiles: vec![TileSums::default(); tile::count(window)],
+            parts: BTreeMap::new(),
             splats: None,
             pieces: (0, 0),
+            twin: None,
+        }
+    }
+
+    /// An empty film for an adaptive render, in halves.
+    pub fn in_halves(window: [u32; 4], features: bool) -> Self {
+        Self {
+            twin: Some(Box::new(Self::new(window, features))),
+            ..Self::new(window, features)
+        }
+    }
+
+    /// The first half, or the second.
+    pub(crate) fn half(&mut self, second: bool) -> &mut Self {
+        if !second || self.twin.is_none() {
+            return self;
+        }
+        self.twin
+            .as_deref_mut()
+            .unwrap_or_else(|| unreachable!("there is a twin"))
+    }
+
+    /// The halves, or the film that has none.
+    pub(crate) fn halves(&self) -> impl Iterator<Item = &Self> {
+        std::iter::once(self).chain(self.twin.as_deref())
+    }
+
+    /// Makes this film the first half, and another the second.
+    pub(crate) fn set_twin(&mut self, twin: Self) {
+        self.twin = Some(Box::new(twin));
+    }
+
+    /// True if features are kept.
+    pub(crate) fn has_features(&self) -> bool {
+        !self.features.is_empty()
+    }
+
+    /// Makes one film of the halves, which must be of the same samples but for those in progress.
+    pub(crate) fn unite(&mut self) -> Result<(), String> {
+        match self.twin.take() {
+            Some(twin) => self.join(&twin),
+            None => Ok(()),
         }
     }
 
@@ -249,69 +149,193 @@ impl Film {
         ]
     }
 
+    /// The window that is rendered: x0, y0, x1, y1 in pixels of the full image.
+    pub fn window(&self) -> [u32; 4] {
+        self.window
+    }
+
+    /// The tiles, in rows from the top.
+    pub fn tiles(&self) -> impl ExactSizeIterator<Item = Rect> + use<> {
+        tile::all(self.window)
+    }
+
+    /// Which samples tile `tile` has; of an adaptive render those of its first half.
+    pub fn coverage(&self, tile: usize) -> &Coverage {
+        self.tiles[tile].coverage()
+    }
+
+    /// True if walks from lights have left light.
+    pub fn has_splats(&self) -> bool {
+        self.halves().any(|h| h.splats.is_some())
+    }
+
     /// Adds a finished buffer; `filter` spreads its splats.
-    pub fn merge(&mut self, mut b: Buffer, filter: &Filter) {
-        b.end_batch();
-        let samples: u64 = b.pixels.iter().map(|p| u64::from(p.samples)).sum();
-        if !b.splats.is_empty() && self.splats.is_none() {
-            // Pieces that came before had none to give: they count as well.
-            let pieces = self.pieces;
-            let mut sums = splat::Sums::new(self.pixels.len());
-            sums.skip(pieces.0, pieces.1);
-            self.splats = Some(sums);
+    ///
+    /// # Errors
+    /// If some of its samples are there already, or it has some of two nets; then nothing is changed.
+    pub fn merge(&mut self, b: Buffer, filter: &Filter) -> Result<(), String> {
+        let tile = tile::at(self.window, b.min);
+        let rect = tile::rect(self.window, tile);
+        let net = nets::around(b.samples.start);
+        if b.samples.end > net.end || (rect.min, rect.pixels()) != (b.min, b.pixels.len()) {
+            return Err("a piece of work is a tile and samples of one net".into());
         }
-        if let Some(sums) = &mut self.splats {
-            sums.add(&b.splats, self.window, filter, samples);
+        self.tiles[tile]
+            .cover(b.samples.clone())
+            .map_err(|twice| format!("samples {}..{} are taken twice", twice.start, twice.end))?;
+        let mut part = Part {
+            samples: b.samples.end - b.samples.start,
+            pixels: b.pixels.iter().map(|p| p.radiance).collect(),
+            splats: [0; 3],
+        };
+        let samples = u64::from(part.samples) * b.pixels.len() as u64;
+        if !b.splats.is_empty() {
+            let sums = self
+                .splats
+                .get_or_insert_with(|| splat::Sums::new(self.pixels.len()));
+            part.splats = sums.add(&b.splats, self.window, filter, samples);
+            add(&mut self.tiles[tile].splats, part.splats);
         }
         self.pieces.0 += 1;
         self.pieces.1 += samples;
-        let [width, _] = self.size();
-        for (i, p) in b.pixels.iter().enumerate() {
-            let x = b.min[0] - self.window[0] + i as u32 % b.width;
-            let y = b.min[1] - self.window[1] + i as u32 / b.width;
-            let at = y as usize * width as usize + x as usize;
-            let q = &mut self.pixels[at];
-            for lane in 0..3 {
-                q.sum[lane] += p.sum[lane];
-                q.squares[lane] += p.squares[lane];
-            }
-            q.alpha += p.alpha;
-            q.samples += p.samples;
-            q.batches += p.batches;
+        for (i, at) in rect.indices(self.window).enumerate() {
+            let (p, q) = (&b.pixels[i], &mut self.pixels[at]);
+            add(&mut q.sum, p.radiance);
+            q.alpha = q.alpha.wrapping_add(p.alpha);
             if let (Some(f), Some(g)) = (b.features.get(i), self.features.get_mut(at)) {
-                g.depth += f.depth;
-                g.hits += f.hits;
-                for k in 0..3 {
-                    g.albedo[k] += f.albedo[k];
-                    g.normal[k] += f.normal[k];
-                }
+                g.add(f);
             }
         }
+        self.complete(tile, net.start, part);
+        Ok(())
+    }
+
+    /// Counts a part of a net, together with what else is there of it.
+    fn complete(&mut self, tile: usize, net: u32, mut part: Part) {
+        if let Some(before) = self.parts.remove(&(tile, net)) {
+            self.count(tile, &before, Squares::subtract);
+            part.join(&before);
+        }
+        self.count(tile, &part, Squares::add);
+        if part.samples < nets::around(net).len() as u32 {
+            self.parts.insert((tile, net), part);
+        }
+    }
+
+    /// Counts a net, or a part of it, for the variance, or takes that back.
+    fn count(&mut self, tile: usize, part: &Part, change: fn(&mut Squares, Squares)) {
+        let rect = tile::rect(self.window, tile);
+        let n = f64::from(part.samples);
+        for (at, sum) in rect.indices(self.window).zip(&part.pixels) {
+            for (square, sum) in self.pixels[at].squares.iter_mut().zip(sum) {
+                change(square, Squares::of(float(*sum), n));
+            }
+        }
+        let mean = part.mean(self.pixels.len());
+        for (square, mean) in self.tiles[tile].squares.iter_mut().zip(mean) {
+            change(square, Squares::of(mean, n));
+        }
+    }
+
+    /// Adds another film of the same picture.
+    ///
+    /// # Errors
+    /// If they are not parts of one picture, or have samples in common; then nothing is changed.
+    pub fn join(&mut self, other: &Self) -> Result<(), String> {
+        if self.window != other.window || self.features.len() != other.features.len() {
+            return Err("they are not of one picture".into());
+        }
+        if self.twin.is_some() || other.twin.is_some() {
+            return Err("adaptive renders have no sample ranges".into());
+        }
+        let mut tiles = self.tiles.clone();
+        for (i, (a, b)) in tiles.iter_mut().zip(&other.tiles).enumerate() {
+            a.join(b).map_err(|twice| {
+                let [x, y] = tile::rect(self.window, i).min;
+                let Range { start, end } = twice;
+                format!("both have samples {start}..{end} of the tile at ({x}, {y})")
+            })?;
+        }
+        self.tiles = tiles;
+        for (a, b) in self.pixels.iter_mut().zip(&other.pixels) {
+            add(&mut a.sum, b.sum);
+            a.alpha = a.alpha.wrapping_add(b.alpha);
+            let squares = a.squares.iter_mut().zip(b.squares);
+            squares.for_each(|(a, b)| a.add(b));
+        }
+        for (a, b) in self.features.iter_mut().zip(&other.features) {
+            a.add(b);
+        }
+        if let Some(splats) = &other.splats {
+            self.splats
+                .get_or_insert_with(|| splat::Sums::new(self.pixels.len()))
+                .join(splats);
+        }
+        self.pieces.0 = self.pieces.0.wrapping_add(other.pieces.0);
+        self.pieces.1 = self.pieces.1.wrapping_add(other.pieces.1);
+        for ((tile, net), part) in &other.parts {
+            // Both have counted what they have of the net.
+            self.count(*tile, part, Squares::subtract);
+            self.complete(*tile, *net, part.clone());
+        }
+        Ok(())
+    }
+
+    /// One tile as a film of its own, without features and splats.
+    pub(crate) fn cut(&self, tile: usize) -> Self {
+        let rect = tile::rect(self.window, tile);
+        let mut out = Self::new([rect.min[0], rect.min[1], rect.max[0], rect.max[1]], false);
+        out.pixels = rect.indices(self.window).map(|i| self.pixels[i]).collect();
+        out.tiles[0] = self.tiles[tile].clone();
+        let parts = self.parts.range((tile, 0)..(tile + 1, 0));
+        out.parts = parts
+            .map(|((_, net), part)| ((0, *net), part.clone()))
+            .collect();
+        out
     }
 
     /// True if no pixel has a sample yet.
     pub fn is_empty(&self) -> bool {
-        self.pixels.iter().all(|p| p.samples == 0)
+        self.halves().all(|h| h.pieces.1 == 0)
     }
 
     /// The estimates of pixel `i`, counted in rows from the top of the window.
     pub fn estimate(&self, i: usize) -> Estimate {
+        let own = self.half_estimate(i);
+        let Some(twin) = &self.twin else {
+            return own;
+        };
+        let other = twin.half_estimate(i);
+        // Only before both have begun, by an interruption: nothing was decided by then.
+        if own.samples == 0 || other.samples == 0 {
+            return if own.samples == 0 { other } else { own };
+        }
+        let mean = |a: f64, b: f64| 0.5 * (a + b);
+        let variances = own.variance.zip(other.variance);
+        Estimate {
+            mean: [0, 1, 2].map(|k| mean(own.mean[k], other.mean[k])),
+            variance: variances.map(|(a, b)| [0, 1, 2].map(|k| 0.25 * (a[k] + b[k]))),
+            alpha: mean(own.alpha, other.alpha),
+            samples: own.samples + other.samples,
+            degrees: own.degrees + other.degrees,
+        }
+    }
+
+    fn half_estimate(&self, i: usize) -> Estimate {
         let p = &self.pixels[i];
-        let n = f64::from(p.samples.max(1));
+        let tile = &self.tiles[tile::of_pixel(self.window, i)];
+        let (samples, nets) = (tile.samples(), tile.nets());
+        let n = f64::from(samples.max(1));
         let mut mean = p.sum.map(|s| float(s) / n);
-        let mut variance = (p.batches >= 2).then(|| {
-            let mut v = [0.0; 3];
-            for lane in 0..3 {
-                let spread = (p.squares[lane] - n * mean[lane] * mean[lane]).max(0.0);
-                v[lane] = spread / (f64::from(p.batches - 1) * n);
-            }
-            v
+        let mut variance = (nets >= 2).then(|| {
+            [0, 1, 2].map(|lane| {
+                let spread = p.squares[lane].float() - n * mean[lane] * mean[lane];
+                spread.max(0.0) / (f64::from(nets - 1) * n)
+            })
         });
         if let Some(splats) = &self.splats {
-            let (m, v) = splats.estimate(i);
-            for lane in 0..3 {
-                mean[lane] += m[lane];
-            }
+            let (m, v) = splats.estimate(i, self.pieces);
+            mean = [0, 1, 2].map(|lane| mean[lane] + m[lane]);
             // A pixel's own samples and what falls on it from all others' are all but independent.
             variance = variance.zip(v).map(|(a, b)| [0, 1, 2].map(|k| a[k] + b[k]));
         }
@@ -319,114 +343,28 @@ impl Film {
             mean,
             variance,
             alpha: float(p.alpha) / n,
-            samples: p.samples,
+            samples,
+            degrees: nets.saturating_sub(1),
         }
     }
 
     /// The features of pixel `i`; zero if they were not asked for.
     pub fn features(&self, i: usize) -> Features {
-        let Some(f) = self.features.get(i).filter(|f| f.hits > 0) else {
+        let mut f = FeatureSums::default();
+        for h in self.halves().filter_map(|h| h.features.get(i)) {
+            f.add(h);
+        }
+        if f.hits == 0 {
             return Features::default();
-        };
-        let n = f64::from(f.hits);
+        }
+        let n = f.hits as f64;
         Features {
             depth: float(f.depth) / n,
             albedo: f.albedo.map(|v| float(v) / n),
             normal: f.normal.map(|v| float(v) / n),
         }
     }
-
-    /// Estimated relative error of the picture: the square root of the mean over pixels and lanes of
-    /// variance/(mean² + 0.01 m²), m the picture's mean; `None` before two batches are there.
-    pub fn relative_error(&self) -> Option<f64> {
-        let mut total = 0.0;
-        for i in 0..self.pixels.len() {
-            total += self.estimate(i).mean.iter().sum::<f64>();
-        }
-        let m = total / (3 * self.pixels.len()).max(1) as f64;
-        let (mut sum, mut count) = (0.0, 0usize);
-        for i in 0..self.pixels.len() {
-            let e = self.estimate(i);
-            let v = e.variance?;
-            for (v, mean) in v.iter().zip(e.mean) {
-                let scale = mean * mean + 0.01 * m * m;
-                if scale > 0.0 {
-                    sum += v / scale;
-                }
-                count += 1;
-            }
-        }
-        Some((sum / count.max(1) as f64).sqrt())
-    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use resolvent_api::rng::Stream;
-
-    fn sample(v: f32) -> PixelSample {
-        PixelSample {
-            radiance: Spectrum::rgb(v, 2.0 * v, -v),
-            alpha: 1.0,
-            ..Default::default()
-        }
-    }
-
-    #[test]
-    fn fixed_point_is_exact_for_ordinary_values() {
-        for v in [0.0f32, 1.0, -0.1, 3.25e11, 1e-9, f32::MIN_POSITIVE] {
-            let back = float(fix(v));
-            assert!(
-                (back - f64::from(v)).abs() <= 0.5f64.powi(FRACTION),
-                "{v} {back}"
-            );
-        }
-    }
-
-    /// Mean and variance of batches against the textbook formulas, and any division into ranges gives the same sums.
-    #[test]
-    fn batches_merge_to_the_same_sums() {
-        let mut stream = Stream::new(5);
-        let values: Vec<f32> = (0..8 * BATCH).map(|_| stream.uniform() * 10.0).collect();
-        let run = |cuts: &[u32]| {
-            let mut film = Film::new([3, 4, 4, 5], false);
-            for w in cuts.windows(2) {
-                let mut b = Buffer::new([3, 4], [4, 5], w[0], false);
-                for s in w[0]..w[1] {
-                    b.add(3, 4, &sample(values[s as usize])).unwrap();
-                }
-                film.merge(b, &Filter::Box(0.5));
-            }
-            film
-        };
-        let whole = run(&[0, 8 * BATCH]);
-        let parts = run(&[0, BATCH, 5 * BATCH, 8 * BATCH]);
-        assert_eq!(whole.pixels[0].sum, parts.pixels[0].sum);
-        assert_eq!(whole.estimate(0), parts.estimate(0));
-        let e = whole.estimate(0);
-        let means: Vec<f64> = values
-            .chunks(BATCH as usize)
-            .map(|c| c.iter().map(|v| f64::from(*v)).sum::<f64>() / f64::from(BATCH))
-            .collect();
-        let mean = means.iter().sum::<f64>() / 8.0;
-        let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 7.0 / 8.0;
-        assert!((e.mean[0] - mean).abs() < 1e-12);
-        assert!((e.variance.unwrap()[0] / variance - 1.0).abs() < 1e-9);
-        assert!((e.variance.unwrap()[1] / (4.0 * variance) - 1.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn bad_samples_are_counted_and_left_out() {
-        let mut b = Buffer::new([0, 0], [2, 1], 0, false);
-        b.add(0, 0, &sample(1.0)).unwrap();
-        b.add(0, 0, &sample(f32::NAN)).unwrap();
-        b.add(0, 0, &sample(f32::INFINITY)).unwrap();
-        assert!(b.add(2, 0, &sample(1.0)).is_err());
-        assert_eq!((b.rejected, b.rejected_at), (2, Some([0, 0])));
-        let mut film = Film::new([0, 0, 2, 1], false);
-        film.merge(b, &Filter::Box(0.5));
-        assert_eq!(film.estimate(0).samples, 3);
-        assert!((film.estimate(0).mean[0] - 1.0 / 3.0).abs() < 1e-12);
-    }
-}
+mod tests;

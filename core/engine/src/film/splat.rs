@@ -3,12 +3,9 @@
 //! Every pixel receives a splat times the value of its reconstruction filter there; sums are integers, so that the order in
 //! which pieces of work arrive leaves no trace. Each piece is a batch for the variance, weighted by its samples.
 
-use super::{LARGEST, fix, float};
+use super::fixed::{Squares, add, fits, fix, float};
 use crate::filter::Filter;
 use resolvent_api::Spectrum;
-
-/// Fractional bits of the sums of squares.
-const SQUARES: i32 = 80;
 
 /// The splats of one piece of work, in order.
 #[derive(Clone, Debug, Default)]
@@ -19,8 +16,7 @@ impl Splats {
     #[inline]
     pub fn add(&mut self, film: [f32; 2], radiance: Spectrum) -> bool {
         let value = [radiance[0], radiance[1], radiance[2]];
-        let good = value.iter().all(|v| v.is_finite() && v.abs() <= LARGEST)
-            && film.iter().all(|v| v.is_finite());
+        let good = value.iter().all(|v| fits(*v)) && film.iter().all(|v| v.is_finite());
         if good && value != [0.0; 3] {
             self.0.push((film, value));
         }
@@ -34,12 +30,11 @@ impl Splats {
 }
 
 /// The sums of a whole image.
+#[derive(Clone, Debug)]
 pub(super) struct Sums {
-    sum: Vec<[i128; 3]>,
+    pub sum: Vec<[i128; 3]>,
     /// Σ over pieces of (sum of the piece)²/samples of the piece.
-    squares: Vec<[i128; 3]>,
-    pieces: u64,
-    samples: u64,
+    pub squares: Vec<[Squares; 3]>,
     /// Sums of the piece in progress, and the pixels it touched.
     piece: Vec<[i128; 3]>,
     touched: Vec<u32>,
@@ -50,22 +45,20 @@ impl Sums {
     pub fn new(pixels: usize) -> Self {
         Self {
             sum: vec![[0; 3]; pixels],
-            squares: vec![[0; 3]; pixels],
-            pieces: 0,
-            samples: 0,
+            squares: vec![[Squares::default(); 3]; pixels],
             piece: vec![[0; 3]; pixels],
             touched: Vec::new(),
         }
     }
 
-    /// Counts pieces that gave nothing.
-    pub fn skip(&mut self, pieces: u64, samples: u64) {
-        self.pieces += pieces;
-        self.samples += samples;
-    }
-
-    /// Adds a piece of `samples` samples of a film with the given window.
-    pub fn add(&mut self, splats: &Splats, window: [u32; 4], filter: &Filter, samples: u64) {
+    /// Adds a piece of `samples` samples of a film with the given window. Returns its sum over all pixels.
+    pub fn add(
+        &mut self,
+        splats: &Splats,
+        window: [u32; 4],
+        filter: &Filter,
+        samples: u64,
+    ) -> [i128; 3] {
         let [x0, y0, x1, y1] = window.map(|v| v as f32);
         let width = window[2] - window[0];
         let r = filter.radius();
@@ -88,20 +81,18 @@ impl Sums {
                 y += 1.0;
             }
         }
-        self.pieces += 1;
-        self.samples += samples;
-        let scale = (2f64).powi(SQUARES) / samples.max(1) as f64;
+        let mut total = [0; 3];
         for i in self.touched.drain(..) {
             let i = i as usize;
+            add(&mut self.sum[i], self.piece[i]);
+            add(&mut total, self.piece[i]);
             for lane in 0..3 {
-                let v = self.piece[i][lane];
-                self.sum[i][lane] += v;
-                // Rounded once per piece; saturates far beyond any picture.
-                let square = (float(v) * float(v) * scale) as i128;
-                self.squares[i][lane] = self.squares[i][lane].saturating_add(square);
+                let square = Squares::of(float(self.piece[i][lane]), samples.max(1) as f64);
+                self.squares[i][lane].add(square);
             }
             self.piece[i] = [0; 3];
         }
+        total
     }
 
     fn deposit(&mut self, i: u32, value: [i128; 3]) {
@@ -109,20 +100,31 @@ impl Sums {
         if *at == [0; 3] {
             self.touched.push(i);
         }
-        for lane in 0..3 {
-            at[lane] += value[lane];
+        add(at, value);
+    }
+
+    /// Adds the sums of another film.
+    pub fn join(&mut self, other: &Self) {
+        for (a, b) in self.sum.iter_mut().zip(&other.sum) {
+            add(a, *b);
+        }
+        for (a, b) in self.squares.iter_mut().zip(&other.squares) {
+            a.iter_mut().zip(b).for_each(|(a, b)| a.add(*b));
         }
     }
 
-    /// Mean of pixel `i` and its variance, if there were two pieces.
-    pub fn estimate(&self, i: usize) -> ([f64; 3], Option<[f64; 3]>) {
-        let n = self.samples.max(1) as f64;
+    /// Mean of pixel `i` after some pieces with so many samples together, and its variance, if there were two.
+    pub fn estimate(
+        &self,
+        i: usize,
+        (pieces, samples): (u64, u64),
+    ) -> ([f64; 3], Option<[f64; 3]>) {
+        let n = samples.max(1) as f64;
         let mean = self.sum[i].map(|s| float(s) / n);
-        let variance = (self.pieces >= 2).then(|| {
+        let variance = (pieces >= 2).then(|| {
             [0, 1, 2].map(|lane| {
-                let squares = self.squares[i][lane] as f64 * (0.5f64).powi(SQUARES);
-                let spread = (squares - n * mean[lane] * mean[lane]).max(0.0);
-                spread / ((self.pieces - 1) as f64 * n)
+                let spread = self.squares[i][lane].float() - n * mean[lane] * mean[lane];
+                spread.max(0.0) / ((pieces - 1) as f64 * n)
             })
         });
         (mean, variance)
@@ -167,12 +169,13 @@ mod tests {
                     sums.add(&p, WINDOW, &filter, 320);
                     one.add(&p, WINDOW, &filter, 320);
                 }
-                estimates.push((one.estimate(33).0[1], one.estimate(33).1.unwrap()[1]));
+                let (mean, variance) = one.estimate(33, (8, 8 * 320));
+                estimates.push((mean[1], variance.unwrap()[1]));
             }
             // Splats carry the inverse of their density, 1/320 of the samples: the mean of a pixel is 1/320.
             let (mut worst, mut chi2) = (0f64, 0f64);
             for i in 0..80 {
-                let (mean, variance) = sums.estimate(i);
+                let (mean, variance) = sums.estimate(i, (320, 320 * 320));
                 let z = (mean[1] * 320.0 - 1.0) / (variance.unwrap()[1].sqrt() * 320.0);
                 worst = worst.max(z.abs());
                 chi2 += z * z;
@@ -195,10 +198,20 @@ mod tests {
             for k in order {
                 sums.add(&piece(*k, 100 + *k as u32), WINDOW, &filter, 50 + k);
             }
-            sums.skip(1, 10);
-            (0..80).map(|i| sums.estimate(i)).collect::<Vec<_>>()
+            (sums.sum, sums.squares)
         };
         assert_eq!(run(&[1, 2, 3, 4]), run(&[3, 1, 4, 2]));
+        let mut halves = Sums::new(80);
+        for order in [[1, 3], [4, 2]] {
+            let (sum, squares) = run(&order);
+            let half = Sums {
+                sum,
+                squares,
+                ..Sums::new(80)
+            };
+            halves.join(&half);
+        }
+        assert_eq!((halves.sum, halves.squares), run(&[1, 2, 3, 4]));
     }
 
     #[test]

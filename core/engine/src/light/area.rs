@@ -52,8 +52,8 @@ impl AreaPoint {
 
 /// The form of an emitting shape.
 pub enum AreaShape {
-    /// A parallelogram; points are uniform in area.
-    Quad(Quad),
+    /// A parallelogram and its unit normal; points are uniform in area.
+    Quad(Quad, Vec3),
     /// A sphere; directions are uniform in the cone it fills as seen from outside, points uniform in area from inside.
     Sphere(Sphere),
     /// A disk, with a frame around its normal; points are uniform in area.
@@ -76,7 +76,7 @@ impl Area {
             shape,
             radiance,
             two_sided,
-            form: AreaShape::Quad(quad),
+            form: AreaShape::Quad(quad, quad.edge_u.cross(quad.edge_v).normalize_or_zero()),
             area,
             terms: Vec3::ZERO,
             texture: None,
@@ -186,6 +186,7 @@ impl Area {
     }
 
     /// Chooses a point for `from`; `None` if it shows nothing there.
+    #[inline]
     pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
         if let AreaShape::Sphere(s) = &self.form {
             return self.sample_sphere(s, from, u);
@@ -196,15 +197,15 @@ impl Area {
     }
 
     /// Chooses a point, uniform in area.
+    #[inline]
     pub fn point(&self, u: [f32; 2]) -> Option<AreaPoint> {
         let mut uv = [0.0; 2];
         let (p, size, ng, prim) = match &self.form {
-            AreaShape::Quad(q) => {
+            AreaShape::Quad(q, ng) => {
                 let p = q.corner + q.edge_u * u[0] + q.edge_v * u[1];
-                let ng = q.edge_u.cross(q.edge_v).normalize_or_zero();
                 let size = q.corner.abs() + q.edge_u.abs() + q.edge_v.abs();
                 uv = u;
-                (p, size, ng, u32::from(u[1] > u[0]))
+                (p, size, *ng, u32::from(u[1] > u[0]))
             }
             AreaShape::Mesh(mesh, distribution) => {
                 let (i, rest) = distribution.sample(u[0])?;
@@ -256,6 +257,7 @@ impl Area {
         })
     }
 
+    #[inline(always)]
     fn finish(&self, from: Vec3, at: &AreaPoint, density: f32) -> Option<LightSample> {
         let (p, ng) = (at.p, at.ng);
         let d = p - from;

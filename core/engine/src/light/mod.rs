@@ -14,6 +14,7 @@ mod spot;
 mod tree;
 
 pub use area::{Area, AreaPoint, AreaShape};
+pub use bound::Bound;
 pub use distribution::Distribution;
 pub use emission::BoundingSphere;
 pub use image::ImageEnvironment;
@@ -138,6 +139,7 @@ impl Light {
 
     /// Chooses a point for `from` by the two numbers `u`. For infinite lights, density and radiance are this
     /// light's alone.
+    #[inline]
     pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Constant { radiance } => {
@@ -220,6 +222,7 @@ impl Light {
 }
 
 /// Density (sr⁻¹) of a direction given the density per area at the point it leads to.
+#[inline(always)]
 fn per_solid_angle(per_area: f32, from: Vec3, at: Vec3, ng: Vec3) -> f32 {
     let d = at - from;
     let d2 = d.length_squared();

@@ -50,7 +50,7 @@ pub(super) fn take_failure() -> String {
 
 /// Takes what a plugin reported on this thread and nobody asked for yet, if anything: calls without a status (a BSDF's traits,
 /// a closure's lobes) report a panic in this way alone.
-pub(crate) fn pending_failure() -> Option<String> {
+pub fn pending_failure() -> Option<String> {
     FAILURE.with(|f| f.borrow_mut().take())
 }
 

@@ -39,6 +39,54 @@ pub struct Counters {
 }
 
 impl Counters {
+    /// All counts, in the order of the fields.
+    pub(crate) fn to_array(self) -> [u64; 10] {
+        [
+            self.rays,
+            self.shadow_rays,
+            self.flights,
+            self.transmittances,
+            self.depths,
+            self.collisions,
+            self.nulls,
+            self.lookups,
+            self.violations,
+            self.rejected,
+        ]
+    }
+
+    /// The counts that [`Counters::to_array`] gave.
+    pub(crate) fn from_array(all: &[u64]) -> Option<Self> {
+        // Sums of what files say must not overflow.
+        if all.iter().any(|n| *n > 1 << 60) {
+            return None;
+        }
+        let [
+            rays,
+            shadow_rays,
+            flights,
+            transmittances,
+            depths,
+            collisions,
+            nulls,
+            lookups,
+            violations,
+            rejected,
+        ] = *<&[u64; 10]>::try_from(all).ok()?;
+        Some(Self {
+            rays,
+            shadow_rays,
+            flights,
+            transmittances,
+            depths,
+            collisions,
+            nulls,
+            lookups,
+            violations,
+            rejected,
+        })
+    }
+
     /// Adds another's counts.
     pub fn add(&mut self, o: &Self) {
         self.rays += o.rays;
@@ -344,7 +392,8 @@ unsafe extern "C" fn emit(
         Some(mut ray) => {
             // Lights at infinity stand outside everything.
             if !vertex.is_infinite() {
-                ray.inside = scene.interiors_at(ray.o.into());
+                let start = scene.starts.get(vertex.light as usize).copied().flatten();
+                ray.inside = start.unwrap_or_else(|| scene.interiors_at(ray.o.into()));
             }
             // SAFETY: as above.
             unsafe { *out = ray };

@@ -1,0 +1,127 @@
+//! The samples of one piece of work: a rectangle of pixels, and samples of one net.
+
+use super::fixed::{add, fits, fix};
+use super::splat::Splats;
+use resolvent_api::Spectrum;
+use resolvent_api::abi::PixelSample;
+use std::ops::Range;
+
+/// Sums of one pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// Radiance, three lanes.
+    pub radiance: [i128; 3],
+    /// Coverage.
+    pub alpha: i128,
+    taken: u32,
+}
+
+/// Sums of one pixel's features.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeatureSums {
+    pub(super) depth: i128,
+    pub(super) hits: u64,
+    pub(super) albedo: [i128; 3],
+    pub(super) normal: [i128; 3],
+}
+
+impl FeatureSums {
+    pub(super) fn add(&mut self, o: &Self) {
+        self.depth = self.depth.wrapping_add(o.depth);
+        self.hits = self.hits.wrapping_add(o.hits);
+        add(&mut self.albedo, o.albedo);
+        add(&mut self.normal, o.normal);
+    }
+}
+
+/// A rectangle of pixels that one worker fills.
+pub struct Buffer {
+    pub(super) min: [u32; 2],
+    pub(super) width: u32,
+    pub(super) samples: Range<u32>,
+    pub(super) pixels: Vec<Sums>,
+    pub(super) features: Vec<FeatureSums>,
+    /// Light from walks that started at lights.
+    pub splats: Splats,
+    /// Samples that were left out.
+    pub rejected: u64,
+    /// Where the first of them was.
+    pub rejected_at: Option<[u32; 2]>,
+}
+
+impl Buffer {
+    /// An empty buffer for pixels from `min` up to, not including, `max`, and samples of one net.
+    pub fn new(min: [u32; 2], max: [u32; 2], samples: Range<u32>, features: bool) -> Self {
+        let width = max[0] - min[0];
+        let count = (width * (max[1] - min[1])) as usize;
+        Self {
+            min,
+            width,
+            samples,
+            pixels: vec![Sums::default(); count],
+            features: if features {
+                vec![FeatureSums::default(); count]
+            } else {
+                Vec::new()
+            },
+            splats: Splats::default(),
+            rejected: 0,
+            rejected_at: None,
+        }
+    }
+
+    /// Adds the next sample of pixel (x, y). A sample that is not finite counts as taken and black, and is reported.
+    #[inline]
+    pub fn add(&mut self, x: u32, y: u32, s: &PixelSample) -> Result<(), String> {
+        let (column, row) = (x.wrapping_sub(self.min[0]), y.wrapping_sub(self.min[1]));
+        let index = (row as usize) * (self.width as usize) + column as usize;
+        if column >= self.width || index >= self.pixels.len() {
+            return Err(format!(
+                "added a sample to pixel ({x}, {y}), which is not in its tile"
+            ));
+        }
+        let good = s.radiance.0[..3].iter().all(|v| fits(*v)) && fits(s.alpha);
+        let radiance = if good { s.radiance } else { Spectrum::ZERO };
+        if !good {
+            self.rejected += 1;
+            self.rejected_at.get_or_insert([x, y]);
+        }
+        let p = &mut self.pixels[index];
+        for lane in 0..3 {
+            p.radiance[lane] += fix(radiance[lane]);
+        }
+        p.alpha += fix(if good { s.alpha } else { 0.0 });
+        p.taken += 1;
+        if let Some(f) = self.features.get_mut(index)
+            && s.depth > 0.0
+            && fits(s.depth)
+            && s.albedo.iter().chain(&s.normal).all(|v| fits(*v))
+        {
+            f.depth += fix(s.depth);
+            f.hits += 1;
+            for i in 0..3 {
+                f.albedo[i] += fix(s.albedo[i]);
+                f.normal[i] += fix(s.normal[i]);
+            }
+        }
+        Ok(())
+    }
+
+    /// The radiance alone.
+    pub(crate) fn bare(mut self) -> Self {
+        self.features = Vec::new();
+        self.splats = Splats::default();
+        self
+    }
+
+    /// The first pixel that has not exactly the samples that were asked for, with the number it has.
+    pub fn uneven(&self) -> Option<([u32; 2], u32)> {
+        let wanted = self.samples.end - self.samples.start;
+        let i = self.pixels.iter().position(|p| p.taken != wanted)?;
+        let at = [
+            self.min[0] + i as u32 % self.width,
+            self.min[1] + i as u32 / self.width,
+        ];
+        Some((at, self.pixels[i].taken))
+    }
+}

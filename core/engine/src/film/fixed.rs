@@ -1,0 +1,158 @@
+//! Numbers in fixed point, whose sums do not depend on the order of addition.
+
+/// Fractional bits of sums.
+const FRACTION: i32 = 64;
+/// Largest magnitude a single value may have; beyond, it is rejected like an infinity. Leaves room for 2²³ samples.
+const LARGEST: f32 = 1e12;
+
+/// True if a value can be added: it is finite, and not beyond [`LARGEST`].
+#[inline(always)]
+pub fn fits(v: f32) -> bool {
+    v.abs() <= LARGEST
+}
+
+/// Rounds toward zero to fixed point. The value must be one that [`fits`].
+#[inline(always)]
+pub fn fix(v: f32) -> i128 {
+    let bits = v.to_bits();
+    let exponent = (bits >> 23 & 0xff) as i32;
+    let mantissa = i128::from(if exponent == 0 {
+        0
+    } else {
+        bits & 0x7f_ffff | 0x80_0000
+    });
+    let shift = exponent - 150 + FRACTION;
+    let magnitude = if shift >= 0 {
+        mantissa << shift
+    } else {
+        mantissa >> (-shift).min(127)
+    };
+    if bits >> 31 == 0 {
+        magnitude
+    } else {
+        -magnitude
+    }
+}
+
+/// Back to floating point.
+pub fn float(v: i128) -> f64 {
+    v as f64 * (0.5f64).powi(FRACTION)
+}
+
+/// Adds `b` to `a`, lane by lane. Sums of what a renderer adds never wrap; those that a damaged file holds may.
+#[inline(always)]
+pub fn add(a: &mut [i128; 3], b: [i128; 3]) {
+    for lane in 0..3 {
+        a[lane] = a[lane].wrapping_add(b[lane]);
+    }
+}
+
+/// A sum of squares: 192 bits, low ones first, 88 of them fractional. Squares have twice the range of values: this has room
+/// for radiances from 10⁻¹³ to [`LARGEST`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Squares(pub [u64; 3]);
+
+/// Fractional bits of sums of squares.
+const SQUARES: i32 = 88;
+
+impl Squares {
+    /// A non-negative number, rounded toward zero. What does not fit becomes the largest number that does.
+    pub fn new(v: f64) -> Self {
+        let bits = v.to_bits();
+        let exponent = (bits >> 52 & 0x7ff) as i32;
+        let shift = exponent - 1075 + SQUARES;
+        if !(v > 0.0) || exponent == 0 || shift <= -64 {
+            return Self::default();
+        }
+        let mantissa = u128::from(bits & ((1 << 52) - 1) | 1 << 52);
+        if shift < 0 {
+            return Self([(mantissa >> -shift) as u64, 0, 0]);
+        }
+        let (limb, wide) = (shift as usize / 64, mantissa << (shift % 64));
+        let mut out = [0; 3];
+        if limb >= 3 || (limb == 2 && wide >> 64 != 0) {
+            return Self([u64::MAX; 3]);
+        }
+        out[limb] = wide as u64;
+        if limb < 2 {
+            out[limb + 1] = (wide >> 64) as u64;
+        }
+        Self(out)
+    }
+
+    /// The square of a batch's sum over the number of its samples.
+    pub fn of(sum: f64, samples: f64) -> Self {
+        Self::new(sum * sum / samples)
+    }
+
+    /// Adds another sum.
+    pub fn add(&mut self, o: Self) {
+        let mut carry = false;
+        for (a, b) in self.0.iter_mut().zip(o.0) {
+            let (v, one) = a.overflowing_add(b);
+            let (v, two) = v.overflowing_add(u64::from(carry));
+            (*a, carry) = (v, one || two);
+        }
+    }
+
+    /// Takes back what was added.
+    pub fn subtract(&mut self, o: Self) {
+        let mut borrow = false;
+        for (a, b) in self.0.iter_mut().zip(o.0) {
+            let (v, one) = a.overflowing_sub(b);
+            let (v, two) = v.overflowing_sub(u64::from(borrow));
+            (*a, borrow) = (v, one || two);
+        }
+    }
+
+    /// Back to floating point.
+    pub fn float(self) -> f64 {
+        let [a, b, c] = self.0.map(|v| v as f64);
+        let scale = |bits: i32| (2f64).powi(bits - SQUARES);
+        c * scale(128) + b * scale(64) + a * scale(0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use resolvent_api::rng::Stream;
+
+    #[test]
+    fn fixed_point_is_exact_for_ordinary_values() {
+        for v in [0.0f32, 1.0, -0.1, 3.25e11, 1e-9, f32::MIN_POSITIVE] {
+            let back = float(fix(v));
+            assert!(
+                (back - f64::from(v)).abs() <= 0.5f64.powi(FRACTION),
+                "{v} {back}"
+            );
+        }
+    }
+
+    #[test]
+    fn squares_have_their_range() {
+        for v in [0.0, 1.0, 3.7e-20, 1.23456789e28, 1e-26, 0.1, 1e5] {
+            let back = Squares::new(v).float();
+            assert!((back - v).abs() <= 1e-15 * v + 4e-27, "{v} {back}");
+        }
+        assert_eq!(Squares::new(f64::INFINITY), Squares([u64::MAX; 3]));
+        assert_eq!(Squares::new(f64::NAN), Squares::default());
+        assert_eq!(Squares::new(-1.0), Squares::default());
+    }
+
+    /// Any order gives the same sum, and taking back undoes adding.
+    #[test]
+    fn squares_commute() {
+        let mut s = Stream::new(9);
+        let values: Vec<Squares> = (0..1000)
+            .map(|_| Squares::new((f64::from(s.uniform()) * 150.0 - 60.0).exp()))
+            .collect();
+        let (mut there, mut back) = (Squares::default(), Squares::default());
+        values.iter().for_each(|v| there.add(*v));
+        values.iter().rev().for_each(|v| back.add(*v));
+        assert_eq!(there, back);
+        assert!(there.0[1] > 0);
+        values.iter().for_each(|v| there.subtract(*v));
+        assert_eq!(there, Squares::default());
+    }
+}

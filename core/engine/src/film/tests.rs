@@ -1,0 +1,183 @@
+//! Tests of the film.
+
+use super::*;
+use crate::checkpoint::{Checkpoint, State};
+use resolvent_api::Spectrum;
+use resolvent_api::abi::PixelSample;
+use resolvent_api::rng::{Stream, mix};
+use serde_json::json;
+
+const BOX: Filter = Filter::Box(0.5);
+
+fn sample(v: f32) -> PixelSample {
+    PixelSample {
+        radiance: Spectrum::rgb(v, 2.0 * v, -v),
+        alpha: 1.0,
+        depth: 1.0 + v.abs(),
+        albedo: [v.abs(), 0.5, 0.0].into(),
+        ..Default::default()
+    }
+}
+
+/// A film of 20 × 18 pixels, four tiles, with samples that depend on pixel and number alone; some of them splats.
+const WINDOW: [u32; 4] = [3, 4, 23, 22];
+
+fn take(film: &mut Film, samples: Range<u32>, splats: bool) {
+    let mut begin = samples.start;
+    while begin < samples.end {
+        let end = nets::around(begin).end.min(samples.end);
+        for t in film.tiles() {
+            let mut b = Buffer::new(t.min, t.max, begin..end, true);
+            for (x, y) in
+                (t.min[1]..t.max[1]).flat_map(|y| (t.min[0]..t.max[0]).map(move |x| (x, y)))
+            {
+                for i in begin..end {
+                    let key = u64::from(x) << 40 | u64::from(y) << 20 | u64::from(i);
+                    let mut s = Stream::new(mix(key));
+                    b.add(x, y, &sample(s.uniform() * 10.0)).unwrap();
+                    if splats {
+                        let at = [s.uniform() * 24.0, s.uniform() * 24.0];
+                        assert!(b.splats.add(at, Spectrum::splat(s.uniform())));
+                    }
+                }
+            }
+            film.merge(b, &Filter::Tent(1.2)).unwrap();
+        }
+        begin = end;
+    }
+}
+
+fn film(samples: Range<u32>, splats: bool) -> Film {
+    let mut film = Film::new(WINDOW, true);
+    take(&mut film, samples, splats);
+    film
+}
+
+/// All sums, as they stand in a checkpoint.
+fn bytes(film: &Film) -> Vec<u8> {
+    State::new(film.clone()).to_bytes(&json!(null), &json!(null))
+}
+
+/// Mean and variance of nets against the textbook formulas.
+#[test]
+fn variance_is_that_of_nets() {
+    let film = film(0..64, false);
+    let at = |i: u32| {
+        let (x, y) = (3u64, 4u64);
+        let mut s = Stream::new(mix(x << 40 | y << 20 | u64::from(i)));
+        f64::from(s.uniform() * 10.0)
+    };
+    let means: Vec<f64> = (0..4)
+        .map(|b| (16 * b..16 * b + 16).map(at).sum::<f64>() / 16.0)
+        .collect();
+    let mean = means.iter().sum::<f64>() / 4.0;
+    let variance = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 3.0 / 4.0;
+    let e = film.estimate(0);
+    assert!((e.mean[0] - mean).abs() < 1e-12);
+    assert!((e.variance.unwrap()[0] / variance - 1.0).abs() < 1e-9);
+    assert!((e.variance.unwrap()[1] / (4.0 * variance) - 1.0).abs() < 1e-9);
+    assert_eq!((e.samples, e.degrees, e.alpha), (64, 3, 1.0));
+}
+
+/// Parts in any order, cut anywhere, join to the same bits, variances included.
+#[test]
+fn parts_join_to_the_whole() {
+    let whole = film(0..200, false);
+    for cuts in [[0, 16, 64, 200], [0, 7, 77, 200], [0, 65, 66, 200]] {
+        let parts: Vec<Film> = cuts.windows(2).map(|w| film(w[0]..w[1], false)).collect();
+        for order in [[0, 1, 2], [2, 0, 1], [1, 2, 0]] {
+            let mut all = Film::new(WINDOW, true);
+            for k in order {
+                all.join(&parts[k]).unwrap();
+            }
+            assert!(
+                bytes_but_pieces(&all) == bytes_but_pieces(&whole),
+                "{cuts:?} {order:?}"
+            );
+            for i in [0, 100, 359] {
+                assert_eq!(all.estimate(i), whole.estimate(i));
+                assert_eq!(all.features(i), whole.features(i));
+            }
+            assert_eq!(all.interval(), whole.interval());
+        }
+        // One render in three goes.
+        let mut all = Film::new(WINDOW, true);
+        cuts.windows(2)
+            .for_each(|w| take(&mut all, w[0]..w[1], false));
+        assert!(bytes_but_pieces(&all) == bytes_but_pieces(&whole));
+    }
+}
+
+/// The number of pieces matters for the variance of splats alone.
+fn bytes_but_pieces(film: &Film) -> Vec<u8> {
+    let mut film = film.clone();
+    film.pieces.0 = 0;
+    bytes(&film)
+}
+
+/// With splats, the picture's bits are the same for any cut, and those of its variance for cuts between nets.
+#[test]
+fn splats_join_as_well() {
+    let whole = film(0..80, true);
+    for (cuts, all_bits) in [([0, 16, 64, 80], true), ([0, 20, 50, 80], false)] {
+        let mut all = film(cuts[1]..cuts[2], true);
+        all.join(&film(cuts[2]..cuts[3], true)).unwrap();
+        all.join(&film(cuts[0]..cuts[1], true)).unwrap();
+        // Sample 80 cuts a net as well, but in both.
+        assert_eq!(bytes(&all) == bytes(&whole), all_bits);
+        for i in [0, 33, 359] {
+            let (a, b) = (all.estimate(i), whole.estimate(i));
+            assert_eq!(a.mean, b.mean);
+            let (a, b) = (a.variance.unwrap()[0], b.variance.unwrap()[0]);
+            assert!((a / b - 1.0).abs() < 0.3, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_belong_together_is_refused() {
+    let mut a = film(0..40, false);
+    let before = bytes(&a);
+    let why = a.join(&film(36..64, false)).unwrap_err();
+    assert!(why.contains("36..40 of the tile at (3, 4)"), "{why}");
+    assert!(a.join(&Film::new([0, 0, 20, 18], true)).is_err());
+    assert!(a.join(&Film::new(WINDOW, false)).is_err());
+    assert!(a.join(&Film::in_halves(WINDOW, true)).is_err());
+    let b = Buffer::new([3, 4], [19, 20], 8..16, true);
+    assert!(a.merge(b, &BOX).unwrap_err().contains("8..16"));
+    let b = Buffer::new([3, 4], [19, 20], 60..70, true);
+    assert!(a.merge(b, &BOX).is_err());
+    let b = Buffer::new([4, 4], [19, 20], 48..64, true);
+    assert!(a.merge(b, &BOX).is_err());
+    assert!(bytes(&a) == before);
+}
+
+#[test]
+fn bad_samples_are_counted_and_left_out() {
+    let mut b = Buffer::new([0, 0], [2, 1], 0..3, false);
+    b.add(0, 0, &sample(1.0)).unwrap();
+    b.add(0, 0, &sample(f32::NAN)).unwrap();
+    b.add(0, 0, &sample(f32::INFINITY)).unwrap();
+    assert!(b.add(2, 0, &sample(1.0)).is_err());
+    assert_eq!((b.rejected, b.rejected_at), (2, Some([0, 0])));
+    assert_eq!(b.uneven(), Some(([1, 0], 0)));
+    let mut film = Film::new([0, 0, 2, 1], false);
+    film.merge(b, &BOX).unwrap();
+    assert_eq!(film.estimate(0).samples, 3);
+    assert!((film.estimate(0).mean[0] - 1.0 / 3.0).abs() < 1e-12);
+}
+
+/// What is read is what was written: halves, parts, splats and all.
+#[test]
+fn checkpoints_bring_everything_back() {
+    for splats in [false, true] {
+        let film = film(5..70, splats);
+        let written = State::new(film).to_bytes(&json!({"a": 1}), &json!("b"));
+        let read = Checkpoint::from_bytes(&written).unwrap();
+        assert_eq!(
+            (&read.identity, &read.about),
+            (&json!({"a": 1}), &json!("b"))
+        );
+        assert!(read.state.to_bytes(&read.identity, &read.about) == written);
+    }
+}

@@ -1,0 +1,191 @@
+"""Subdivision surfaces against limits that are known in closed form and rules worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import area_vectors
+from resolvent_usd.geometry import subdivide
+
+CUBE = np.array([(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=float)
+FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+
+
+def cage(points, faces, creases=(), sharpness=(), corners=None) -> subdivide.Cage:
+    counts = np.array([len(f) for f in faces])
+    edges = np.array(creases, dtype=np.int64).reshape(-1, 2)
+    corner = np.zeros(len(points)) if corners is None else np.asarray(corners, dtype=float)
+    return subdivide.Cage(
+        counts, np.concatenate(faces), np.asarray(points, dtype=float), edges, np.asarray(sharpness, dtype=float), corner,
+        np.arange(len(faces)),
+    )  # fmt: skip
+
+
+def grid(n: int) -> tuple[np.ndarray, list]:
+    points = np.array([(x, y, 0.0) for y in range(n) for x in range(n)])
+    faces = [[y * n + x, y * n + x + 1, (y + 1) * n + x + 1, (y + 1) * n + x] for y in range(n - 1) for x in range(n - 1)]
+    return points, faces
+
+
+def test_cube_by_hand() -> None:
+    """Catmull and Clark's rules at valence 3: face (0, 0, 1), edge (0, 3/4, 3/4), vertex 5/9."""
+    fine = subdivide.step(cage(CUBE, FACES))
+    assert len(fine.counts) == 24 and len(fine.data) == 8 + 12 + 6
+    assert np.allclose(fine.data[:8], CUBE * 5 / 9)
+    assert np.allclose(np.sort(np.abs(fine.data[8:20]), axis=1), [0, 0.75, 0.75])
+    assert np.allclose(np.sort(np.abs(fine.data[20:]), axis=1), [0, 0, 1])
+
+
+def test_limit_of_the_cube() -> None:
+    """The limit of a vertex does not depend on the level: (n² v + 4 Σe + Σf)/(n(n + 5)) on the refined cage, and for the cube's
+    corner in closed form from level 1: v = 5/9, e = 3/4, f on the axes."""
+    v, e, f = np.array([5 / 9] * 3), np.array([[0, 3 / 4, 3 / 4], [3 / 4, 0, 3 / 4], [3 / 4, 3 / 4, 0]]), np.eye(3)
+    expected = (9 * v + 4 * e.sum(axis=0) + f.sum(axis=0)) / 24
+    c = cage(CUBE, FACES)
+    for _ in range(4):
+        c = subdivide.step(c)
+        assert np.allclose(subdivide.limit(c).data[7], expected, atol=1e-12)
+
+
+def test_regular_grid_is_a_bicubic_b_spline() -> None:
+    """Interior points of a height field converge to the tensor product of cubic B-splines."""
+    points, faces = grid(7)
+    rng = np.random.default_rng(1)
+    heights = rng.normal(size=(7, 7))
+    points[:, 2] = heights.reshape(-1)
+    c = cage(points, faces)
+    for _ in range(3):
+        c = subdivide.step(c)
+    c = subdivide.limit(c)
+    inside = (np.abs(c.data[:, :2] - 3) < 1.5).all(axis=1)
+    assert inside.sum() > 100
+
+    def basis(t: np.ndarray) -> np.ndarray:
+        a = np.abs(t)
+        return np.where(a < 1, 2 / 3 - a**2 + a**3 / 2, np.where(a < 2, (2 - a) ** 3 / 6, 0))
+
+    x, y = c.data[inside, 0], c.data[inside, 1]
+    k = np.arange(7)
+    expected = np.einsum("pi,pj,ij->p", basis(y[:, None] - k), basis(x[:, None] - k), heights)
+    assert np.allclose(c.data[inside, 2], expected, atol=1e-12)
+
+
+def test_boundary_is_a_cubic_b_spline_that_ends_at_corners() -> None:
+    points, faces = grid(4)
+    points[:4, 2] = [0, 1, 3, 0]
+    sharp = np.zeros(16)
+    sharp[[0, 3, 12, 15]] = subdivide.INFINITE
+    c = cage(points, faces, corners=sharp)
+    for _ in range(3):
+        c = subdivide.step(c)
+    c = subdivide.limit(c)
+    assert np.allclose(c.data[[0, 3, 12, 15]], points[[0, 3, 12, 15]])
+    # (1 · 4 · 1)/6 at a control point inside the boundary.
+    assert np.allclose(c.data[1], (points[0] + 4 * points[1] + points[2]) / 6)
+    # Without corners even the ends are smooth: the boundary goes around them.
+    c = cage(points, faces)
+    assert np.allclose(subdivide.limit(subdivide.step(c)).data[0], (points[1] + 4 * points[0] + points[4]) / 6)
+
+
+def loop(z: int) -> list:
+    a, b, c, d = (4 * z + i for i in (0, 1, 3, 2))
+    return [(a, b), (b, c), (c, d), (d, a)]
+
+
+def test_infinite_crease_is_its_own_b_spline() -> None:
+    c = cage(CUBE, FACES, loop(1), [10.0] * 4)
+    for _ in range(3):
+        c = subdivide.step(c)
+    c = subdivide.limit(c)
+    # The crease stays in its plane; its vertices go to (e0 + 4 v + e1)/6.
+    assert np.allclose(c.data[7], (CUBE[5] + 4 * CUBE[7] + CUBE[6]) / 6)
+    # The other side is that of a smooth cube no longer, but still below the crease's plane.
+    assert c.data[:, 2].max() == pytest.approx(1.0)
+
+
+def test_semi_sharp_crease_by_hand() -> None:
+    """Sharpness 0.5 on one loop: edge points are half way between the smooth and the sharp rule, and so are vertices."""
+    smooth = subdivide.step(cage(CUBE, FACES)).data
+    sharp = subdivide.step(cage(CUBE, FACES, loop(1), [10.0] * 4)).data
+    half = subdivide.step(cage(CUBE, FACES, loop(1), [0.5] * 4)).data
+    assert np.allclose(half, 0.5 * (smooth + sharp))
+    # Sharpness 1 is sharp for one level and smooth from then on.
+    one = subdivide.step(cage(CUBE, FACES, loop(1), [1.0] * 4))
+    assert np.allclose(one.data, sharp) and len(one.crease_edges) == 0
+    # 1.5: sharp, then half.
+    two = subdivide.step(cage(CUBE, FACES, loop(1), [1.5] * 4))
+    assert np.allclose(two.data, sharp) and np.allclose(two.crease_sharpness, 0.5) and len(two.crease_edges) == 8
+
+
+def test_darts_and_corners() -> None:
+    """One sharp edge leaves its ends smooth; three sharp edges make a corner; sharpness 2.4 of a corner lasts two levels and more."""
+    dart = subdivide.step(cage(CUBE, FACES, [(6, 7)], [10.0])).data
+    smooth = subdivide.step(cage(CUBE, FACES)).data
+    assert np.allclose(dart[:8], smooth[:8])
+    three = subdivide.step(cage(CUBE, FACES, [(6, 7), (5, 7), (3, 7)], [10.0] * 3)).data
+    assert np.allclose(three[7], CUBE[7])
+    sharp = np.zeros(8)
+    sharp[7] = 2.4
+    c = cage(CUBE, FACES, corners=sharp)
+    for level in range(3):
+        before = c.data[7].copy()
+        c = subdivide.step(c)
+        assert np.allclose(c.data[7], before) == (level < 2)
+
+
+def test_normals_break_at_sharp_edges_only() -> None:
+    c = cage(CUBE, FACES, loop(1), [10.0] * 4)
+    for _ in range(2):
+        c = subdivide.step(c)
+    normals, which = subdivide.smooth_normals(c, c.data)
+    at: dict[int, set[int]] = {}
+    for point, n in zip(c.indices, which, strict=True):
+        at.setdefault(int(point), set()).add(int(n))
+    on_crease = np.isclose(c.data[:, 2], 1.0) & (np.hypot(c.data[:, 0], c.data[:, 1]) > 0.8)
+    for point, sectors in at.items():
+        assert len(sectors) == (2 if on_crease[point] else 1), c.data[point]
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1)
+
+
+MESH = """def Mesh "m" {
+    int[] faceVertexCounts = [4, 4, 4, 4]
+    int[] faceVertexIndices = [0, 1, 4, 3, 1, 2, 5, 4, 3, 4, 7, 6, 4, 5, 8, 7]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 1), (2, 1, 0), (0, 2, 0), (1, 2, 0), (2, 2, 0)]
+    %s
+}"""
+
+
+def test_levels_and_boundary_rules_of_stages(convert_text) -> None:
+    for level in (1, 2, 3):
+        (mesh,) = convert_text(MESH % "", subdivision=level).meshes()
+        assert len(mesh["triangles"]) == 2 * 4 * 4**level
+    corners = {(0.0, 0.0), (2.0, 2.0)}
+    for rule, reached in (("edgeAndCorner", True), ("edgeOnly", False)):
+        (mesh,) = convert_text(MESH % f'uniform token interpolateBoundary = "{rule}"').meshes()
+        found = {tuple(p) for p in mesh["POSITION"][:, :2].tolist()}
+        assert (corners <= found) == reached
+    # "none": faces at the boundary are not drawn, which is all of these.
+    assert convert_text(MESH % 'uniform token interpolateBoundary = "none"').meshes() == []
+
+
+def test_left_handed_subdivision_has_outward_normals(convert_text) -> None:
+    (mesh,) = convert_text(MESH % 'uniform token orientation = "leftHanded"').meshes()
+    assert (area_vectors(mesh)[:, 2] < 0).all() and (mesh["NORMAL"][:, 2] < 0).all()
+
+
+def test_bilinear_stays_flat(convert_text) -> None:
+    (mesh,) = convert_text(MESH % 'uniform token subdivisionScheme = "bilinear"', subdivision=2).meshes()
+    assert len(mesh["triangles"]) == 2 * 4 * 16
+    assert mesh["POSITION"][:, 2].max() == 1 and "NORMAL" not in mesh
+
+
+def test_wrong_creases_name_the_prim(convert_text) -> None:
+    from resolvent_usd.report import InputError
+
+    for extra, words in (
+        ("int[] creaseIndices = [0, 1]; int[] creaseLengths = [3]; float[] creaseSharpnesses = [1]", "creaseLengths"),
+        ("int[] creaseIndices = [0, 99]; int[] creaseLengths = [2]; float[] creaseSharpnesses = [1]", "names a point"),
+        ("int[] cornerIndices = [0, 1]; float[] cornerSharpnesses = [1]", "2 corners"),
+    ):
+        with pytest.raises(InputError, match="/m.*" + words):
+            convert_text(MESH % extra)
