@@ -6,8 +6,8 @@
 mod args;
 #[cfg(feature = "bench")]
 mod bench;
-mod checkpoint;
 mod check;
+mod checkpoint;
 mod compare;
 mod console;
 mod failure;
