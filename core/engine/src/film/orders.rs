@@ -34,13 +34,19 @@ impl Layers {
         self.count
     }
 
-    /// Adds a sample of pixel `i` by its layers; `radiance` is what the picture got of it.
-    pub fn add(&mut self, i: usize, radiance: Spectrum, layers: &[Spectrum]) -> Result<(), String> {
+    /// Adds a sample of pixel `i` by its layers, which `exposure` multiplies; `radiance` is what the picture got of it.
+    pub fn add(
+        &mut self,
+        i: usize,
+        radiance: Spectrum,
+        layers: &[Spectrum],
+        exposure: f32,
+    ) -> Result<(), String> {
         let sums = &mut self.sums[i * self.count..][..self.count];
         for lane in 0..3 {
             let (mut rest, mut total, mut largest) = (fix(radiance[lane]), 0f32, 0);
             for (k, (sum, layer)) in sums.iter_mut().zip(layers).enumerate() {
-                let v = layer[lane];
+                let v = layer[lane] * exposure;
                 if !fits(v) {
                     return Err(format!("gave light of {v} to the scattering order {k}"));
                 }
@@ -48,7 +54,7 @@ impl Layers {
                 sum[lane] += fixed;
                 rest -= fixed;
                 total += v.abs();
-                if v.abs() > layers[largest][lane].abs() {
+                if v.abs() > (layers[largest][lane] * exposure).abs() {
                     largest = k;
                 }
             }
@@ -171,7 +177,7 @@ mod tests {
                         radiance,
                         ..PixelSample::default()
                     };
-                    b.add_orders(x, y, &sample, &layers).unwrap();
+                    b.add_orders(x, y, &sample, &layers, 1.0).unwrap();
                 }
             }
             for k in 0..200 {

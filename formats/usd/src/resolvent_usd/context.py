@@ -64,6 +64,8 @@ class Context:
         self.up_axis = str(UsdGeom.GetStageUpAxis(stage))
         self.used: set[tuple[str, str]] = set()
         """(prim path, property) used by another prim than its own: inherited primvars, bound materials, fields."""
+        self.corners: list[Matrix] = []
+        """World positions of corners of boxes that usd-core does not know: those of volumes, (8, 3) each."""
         self.claims: list[Claim] = []
         self.cameras: list[tuple[str, Matrix]] = []
         """Prim paths and matrices to the world of the cameras that the walk met."""

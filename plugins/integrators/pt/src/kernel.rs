@@ -156,8 +156,7 @@ impl Kernel<'_> {
             let bounce = sampler.bounce(walk.depth, walk.shared);
             walk.shared = bounce.next;
             if connects {
-                let connected =
-                    self.connect::<CHROMATIC>(here, &walk, sampler, &bounce)? * share;
+                let connected = self.connect::<CHROMATIC>(here, &walk, sampler, &bounce)? * share;
                 light += connected;
                 tally.add(order + 1, connected);
             }

@@ -68,7 +68,9 @@ def _light(ctx: Context, claim: Claim) -> Claim | None:
     path = targets.get(str(claim.prim.GetPath()))
     if path is None:
         return None
-    return ctx.claim(ctx.stage.GetPrimAtPath(path), claim.matrix, claim.group)
+    light = ctx.claim(ctx.stage.GetPrimAtPath(path), claim.matrix, claim.group)
+    light.take("geometry")
+    return light
 
 
 def _geometry_lights(ctx: Context) -> dict[str, str]:
