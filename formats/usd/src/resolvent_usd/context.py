@@ -46,6 +46,8 @@ class Look:
     """Keys of the scene's shape: material, emission, emission_texture, two_sided, interior, priority."""
     uv: str | None = None
     """The primvar (without "primvars:") with the texture coordinates of the material's textures."""
+    colors: bool = False
+    """True if textures read the corners' colours: displayColor and displayOpacity."""
 
 
 class Context:
