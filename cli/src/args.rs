@@ -2,10 +2,12 @@
 
 use crate::failure::{Outcome, input};
 use crate::values::{
-    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, positive, share,
+    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, layer,
+    positive, share,
 };
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use resolvent_engine::plugin::Registry;
+use resolvent_scene::Aov;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -103,14 +105,16 @@ pub struct Render {
     /// Render only this window; X1 and Y1 are outside of it
     #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Picture")]
     pub crop: Option<Window>,
-    /// Further layers of EXR files
+    /// Further layers of EXR files: depth, albedo, normal (of the first collision or surface), variance (of each pixel's mean),
+    /// samples, or orders:N (light scattered 0, 1, ... N times, and the rest: layers that sum to the picture)
     #[arg(
         long,
         value_name = "LAYER",
+        value_parser = layer,
         value_delimiter = ',',
         help_heading = "Picture"
     )]
-    pub aov: Vec<Layer>,
+    pub aov: Vec<Aov>,
     /// How PNG files are made
     #[command(flatten)]
     pub tone: Tone,
@@ -368,21 +372,6 @@ impl PluginPath {
     }
 }
 
-/// Further layers.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub enum Layer {
-    /// Distance to the first collision or surface
-    Depth,
-    /// Albedo there
-    Albedo,
-    /// Normal there
-    Normal,
-    /// Variance of each pixel's mean
-    Variance,
-    /// Samples taken
-    Samples,
-}
-
 /// Curves of PNG files.
 #[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
 pub enum ToneCurve {
@@ -457,7 +446,7 @@ pub struct Merge {
 /// Options of `plugin`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so"
+    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so\n  resolvent plugin new soft-ball --kind medium --lang rust\n  resolvent plugin check target/release/libmine.so --isolate"
 )]
 pub struct Plugin {
     /// What to do
@@ -488,6 +477,76 @@ pub enum PluginAction {
         #[command(flatten)]
         plugins: PluginPath,
     },
+    /// Write a complete plugin to start from: source, build file, test, scene
+    New(New),
+    /// Check that a plugin keeps the promises of its kind: statistics, edge cases, threads, memory
+    Check(Check),
+}
+
+/// Options of `plugin new`.
+#[derive(Debug, ClapArgs)]
+pub struct New {
+    /// The plugin's name, as in scenes
+    pub name: String,
+    /// What it is
+    #[arg(long, value_enum)]
+    pub kind: NewKind,
+    /// What it is written in
+    #[arg(long, value_enum, default_value_t = Language::Rust)]
+    pub lang: Language,
+    /// The folder to make [default: the name]
+    #[arg(long, value_name = "DIR")]
+    pub to: Option<PathBuf>,
+    /// Folder of resolvent-api, for Rust [default: that of the sources beside the program, or the published one]
+    #[arg(long, value_name = "DIR")]
+    pub api: Option<PathBuf>,
+}
+
+/// Kinds of plugins.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum NewKind {
+    /// What fills space
+    Medium,
+    /// How a surface scatters
+    Bsdf,
+    /// How a medium scatters
+    Phase,
+    /// How pictures are computed
+    Integrator,
+}
+
+/// Languages that there are templates in.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum Language {
+    /// Against the crate resolvent-api
+    Rust,
+    /// Against resolvent.h
+    C,
+}
+
+/// Options of `plugin check`.
+#[derive(Debug, ClapArgs)]
+pub struct Check {
+    /// A plugin's name, or the path of its library
+    pub plugin: String,
+    /// Parameters to check it with, as JSON; those that are not given are varied over their ranges
+    #[arg(long, value_name = "JSON")]
+    pub params: Option<String>,
+    /// Check in a process of its own, so that a crash or a hang is reported like any other fault
+    #[arg(long)]
+    pub isolate: bool,
+    /// Seconds without progress that count as a hang, with --isolate
+    #[arg(long, value_name = "S", default_value_t = 120)]
+    pub patience: u64,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Say every stage: for the process that --isolate starts
+    #[arg(long, hide = true)]
+    pub stages: bool,
+    /// Where to look first
+    #[command(flatten)]
+    pub plugins: PluginPath,
 }
 
 /// Options of `schema`.

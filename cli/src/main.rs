@@ -6,6 +6,7 @@
 mod args;
 #[cfg(feature = "bench")]
 mod bench;
+mod check;
 mod checkpoint;
 mod compare;
 mod console;
@@ -22,6 +23,7 @@ mod progress;
 mod render;
 mod stats;
 mod system;
+mod template;
 mod usd;
 mod values;
 mod volume;

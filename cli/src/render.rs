@@ -65,7 +65,8 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let halves = 1 + usize::from(matches!(plan.goal, Goal::Error(_)));
     let films = halves * (1 + usize::from(keeper.is_some()));
     let layers = described.film.aovs.len();
-    output::check_memory(described.film.window(), features, layers, films)?;
+    let orders = described.film.order_layers();
+    output::check_memory(described.film.window(), features, [layers, orders], films)?;
 
     let cpu = crate::system::cpu_seconds().unwrap_or(0.0);
     let rendered = render(
@@ -225,6 +226,7 @@ fn render(
         goal: plan.goal,
         seed: described.sampling.seed,
         features: output::wants_features(described),
+        orders: described.film.order_layers(),
     };
     let from = keeper.map_or(Ok(None), Keeper::load)?;
     let save = |bytes: &[u8]| {

@@ -99,6 +99,7 @@ fn image(source: &ImageSource) -> String {
     match source {
         ImageSource::File(file) => file.clone(),
         ImageSource::Memory(image) => format!("{}, {} bytes", image.name, image.bytes.len()),
+        ImageSource::White => "vertex colours".into(),
     }
 }
 

@@ -176,8 +176,13 @@ fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
             let light = punctual(&container.raw, light, &to_world, &mut materials);
             model.lights.extend(light.map_err(at)?);
         }
-        if node.skin.is_some() {
-            materials.warn("skins", "meshes are shown in their bind pose");
+        if let Some(skin) = node.skin.map(|s| s.value()) {
+            let named = root.skins.get(skin).and_then(|s| s.name.as_deref());
+            let what = match named {
+                Some(name) => format!("skin '{name}'"),
+                None => format!("skins[{skin}]"),
+            };
+            materials.warn(&what, "the mesh is shown in its bind pose");
         }
         let Some(mesh) = node.mesh.map(|m| m.value()) else {
             continue;

@@ -196,6 +196,16 @@ impl Film {
         self.crop
             .unwrap_or([0, 0, self.resolution[0], self.resolution[1]])
     }
+
+    /// How many layers of light by scattering order there are: one for each order up to that of [`Aov::Orders`], and one for the
+    /// rest; 0 if none are asked for.
+    pub fn order_layers(&self) -> usize {
+        let orders = self.aovs.iter().find_map(|a| match a {
+            Aov::Orders(n) => Some(*n as usize),
+            _ => None,
+        });
+        orders.map_or(0, |n| n + 2)
+    }
 }
 
 /// Reconstruction filter. Radii are half widths in pixels.
@@ -239,11 +249,14 @@ pub enum Aov {
     Variance,
     /// Samples taken.
     Samples,
+    /// Light by scattering order, as layers `order0` … `orderN` and `order_rest`, which sum to the picture: the N + 1 first terms
+    /// of Σ (GK)^k G Le, and all others. Written `orders:N`.
+    Orders(u32),
 }
 
 impl Aov {
-    /// All of them.
-    pub const ALL: [Aov; 5] = [
+    /// All that a name is enough for.
+    pub const NAMED: [Aov; 5] = [
         Aov::Depth,
         Aov::Albedo,
         Aov::Normal,
@@ -251,7 +264,20 @@ impl Aov {
         Aov::Samples,
     ];
 
-    /// The name in scene files, and of the layer in images.
+    /// Highest order that can have a layer of its own.
+    pub const MOST_ORDERS: u32 = 99;
+
+    /// Reads what stands in scene files and on the command line: a name, or `orders:N`.
+    pub fn parse(text: &str) -> Option<Aov> {
+        if let Some(order) = text.strip_prefix("orders:") {
+            let plain = !order.is_empty() && order.bytes().all(|b| b.is_ascii_digit());
+            let n = order.parse().ok().filter(|_| plain)?;
+            return (n <= Aov::MOST_ORDERS).then_some(Aov::Orders(n));
+        }
+        Aov::NAMED.into_iter().find(|a| a.name() == text)
+    }
+
+    /// The name in scene files, and of the layer in images; without the number of orders.
     pub fn name(self) -> &'static str {
         match self {
             Aov::Depth => "depth",
@@ -259,6 +285,16 @@ impl Aov {
             Aov::Normal => "normal",
             Aov::Variance => "variance",
             Aov::Samples => "samples",
+            Aov::Orders(_) => "orders",
+        }
+    }
+}
+
+impl std::fmt::Display for Aov {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Aov::Orders(n) => write!(f, "orders:{n}"),
+            _ => f.write_str(self.name()),
         }
     }
 }
@@ -288,7 +324,7 @@ pub enum Budget {
     Spp(u64),
     /// After so many seconds, > 0.
     Time(f64),
-    /// When the estimated relative error of the picture is at most this, > 0.
+    /// When the estimated relative error of every tile of the picture is at most this, > 0.
     Error(f64),
 }
 
@@ -544,6 +580,11 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// One texture coordinate per corner, or empty.
     pub uvs: Vec<[f64; 2]>,
+    /// One linear colour and opacity per corner, or empty: what textures with [`Texture::vertex_color`] are multiplied with.
+    pub colors: Vec<[f64; 4]>,
+    /// One tangent per corner, or empty: the direction of growing u for normal maps and anisotropy, and with a negative fourth
+    /// number growing v on the other side of it than usual. Without any they are taken from the texture coordinates.
+    pub tangents: Vec<[f64; 4]>,
     /// The mesh's space to world.
     pub transform: Transform,
 }

@@ -3,6 +3,8 @@
 //! The checker ([`crate::check`]) and the JSON Schema ([`crate::schema`]) are both driven by them, so that
 //! what the one accepts is what the other describes.
 
+use crate::describe::Aov;
+
 /// The format's version, the value of the key `resolvent`.
 pub const VERSION: u32 = 1;
 
@@ -108,8 +110,8 @@ pub(crate) enum Kind {
     Text,
     /// A text that is not empty: names and paths.
     Name,
-    /// A list of different names out of these.
-    Choices(&'static [&'static str]),
+    /// A list of different layers (see [`crate::Aov`]): these, and `orders:N` with N up to the number.
+    Layers(&'static [&'static str], u32),
     /// One name out of these.
     Choice(&'static [&'static str]),
     /// Three coordinates.
@@ -122,6 +124,10 @@ pub(crate) enum Kind {
     Vec3s,
     /// A list of pairs of numbers.
     Pairs,
+    /// A list of lists of four numbers.
+    Fours,
+    /// A list of lists of three or four numbers ≥ 0.
+    Colors,
     /// A list of three indices each.
     Triangles,
     /// One number or three, ≥ 0.
@@ -410,8 +416,11 @@ static FILM: Object = Object {
         ),
         may(
             "aovs",
-            Kind::Choices(&["depth", "albedo", "normal", "variance", "samples"]),
-            "Further layers",
+            Kind::Layers(
+                &["depth", "albedo", "normal", "variance", "samples"],
+                Aov::MOST_ORDERS,
+            ),
+            "Further layers; \"orders:N\": light scattered 0 to N times, and the rest, in layers that sum to the picture",
         ),
     ],
     rules: &[],
@@ -452,7 +461,7 @@ static SAMPLING: Object = Object {
         may(
             "error",
             Kind::Number(Range::above(0.0, 1e3)),
-            "Estimated relative error to reach",
+            "Estimated relative error that no tile of the picture shall exceed",
         ),
         may(
             "seed",
@@ -512,7 +521,7 @@ const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror", "black"]);
 
 static TEXTURE: Object = Object {
     name: "texture",
-    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one",
+    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one; or vertex colours",
     fields: &[
         may(
             "file",
@@ -520,6 +529,11 @@ static TEXTURE: Object = Object {
             "The image file, relative to the scene file; <UDIM> in it stands for the numbers of its tiles, 1001 + column + 10 row",
         ),
         may("data", Kind::Name, "The image file's bytes in base64"),
+        may(
+            "vertex_color",
+            Kind::Bool,
+            "Multiplies the image, or white without one, with the mesh's colours (false)",
+        ),
         may(
             "color_space",
             Kind::Choice(&["auto", "srgb", "linear", "raw"]),
@@ -555,7 +569,8 @@ static TEXTURE: Object = Object {
         ),
     ],
     rules: &[
-        Rule::ExactlyOne(&["file", "data"]),
+        Rule::AtLeastOne(&["file", "data", "vertex_color"]),
+        Rule::AtMostOne(&["file", "data"]),
         Rule::AtMostOne(&["wrap", "wrap_u"]),
         Rule::AtMostOne(&["wrap", "wrap_v"]),
     ],
@@ -920,6 +935,16 @@ static MESH: Object = Object {
         ),
         may("normals", Kind::Vec3s, "One shading normal per corner"),
         may("uvs", Kind::Pairs, "One texture coordinate per corner"),
+        may(
+            "colors",
+            Kind::Colors,
+            "One linear RGB or RGBA per corner, for textures with vertex_color",
+        ),
+        may(
+            "tangents",
+            Kind::Fours,
+            "Direction of growing u per corner, and a sign: -1 where v grows on the other side",
+        ),
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,

@@ -272,10 +272,9 @@ impl Reader<'_> {
         )?;
         let aovs = list(node, "aovs")
             .iter()
-            .filter_map(|n| {
-                Aov::ALL
-                    .into_iter()
-                    .find(|a| matches!(&n.data, Data::Text(t) if &**t == a.name()))
+            .filter_map(|n| match &n.data {
+                Data::Text(t) => Aov::parse(t),
+                _ => None,
             })
             .collect();
         Some(Film {
@@ -516,6 +515,14 @@ impl Reader<'_> {
                 .iter()
                 .map(floats)
                 .collect::<Option<_>>()?,
+            colors: list(node, "colors")
+                .iter()
+                .map(|n| floats(n).or_else(|| floats(n).map(|[r, g, b]| [r, g, b, 1.0])))
+                .collect::<Option<_>>()?,
+            tangents: list(node, "tangents")
+                .iter()
+                .map(floats)
+                .collect::<Option<_>>()?,
             transform: to_world(node)?,
         };
         let corners = mesh.positions.len();
@@ -533,7 +540,12 @@ impl Reader<'_> {
                 );
             }
         }
-        for (key, count) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
+        for (key, count) in [
+            ("normals", mesh.normals.len()),
+            ("uvs", mesh.uvs.len()),
+            ("colors", mesh.colors.len()),
+            ("tangents", mesh.tangents.len()),
+        ] {
             if let Some(at) = node.get(key)
                 && count != corners
             {
@@ -669,7 +681,7 @@ pub(crate) fn number(node: &Node, key: &str) -> Option<f64> {
     }
 }
 
-fn flag(node: &Node, key: &str) -> Option<bool> {
+pub(crate) fn flag(node: &Node, key: &str) -> Option<bool> {
     match node.get(key)?.data {
         Data::Bool(b) => Some(b),
         _ => None,

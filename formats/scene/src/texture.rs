@@ -10,13 +10,16 @@ use crate::error::Place;
 /// corner and (1, 1) its upper right one.
 ///
 /// A value is found in this order: coordinates are transformed ([`Texture::uv`]), wrapped into the image and texels
-/// interpolated, each decoded to linear values first; then [`Texture::channel`] picks one, which becomes red, green
+/// interpolated, each decoded to linear values first; with [`Texture::vertex_color`] they are multiplied with the colour and
+/// opacity that the mesh has at the point; then [`Texture::channel`] picks one, which becomes red, green
 /// and blue; then it is multiplied with [`Texture::scale`] and [`Texture::bias`] is added. Parameters that take one
 /// number take red. The parameter's declared range bounds the outcome: what lies outside is clamped to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// Where the image is.
     pub image: ImageSource,
+    /// Multiplied with the mesh's colours, see [`crate::Mesh::colors`]; shapes without any are white.
+    pub vertex_color: bool,
     /// What its numbers mean.
     pub color_space: ColorSpace,
     /// What lies beyond its edges, across and up.
@@ -40,6 +43,7 @@ impl Texture {
     pub fn new(image: ImageSource) -> Texture {
         Texture {
             image,
+            vertex_color: false,
             color_space: ColorSpace::Auto,
             wrap: [Wrap::Repeat; 2],
             filter: TextureFilter::Bilinear,
@@ -61,6 +65,8 @@ pub enum ImageSource {
     File(String),
     /// The bytes of an image file.
     Memory(MemoryImage),
+    /// None: white everywhere, for colours of vertices alone.
+    White,
 }
 
 /// The bytes of an image file, held in memory and shared.
@@ -83,6 +89,7 @@ impl fmt::Debug for ImageSource {
         match self {
             ImageSource::File(file) => write!(f, "{file:?}"),
             ImageSource::Memory(image) => image.fmt(f),
+            ImageSource::White => f.write_str("white"),
         }
     }
 }

@@ -243,7 +243,7 @@ fn film(f: &Film) -> Json {
         }
     };
     if !f.aovs.is_empty() {
-        out["aovs"] = f.aovs.iter().map(|a| a.name()).collect();
+        out["aovs"] = f.aovs.iter().map(|a| a.to_string()).collect();
     }
     out
 }
@@ -358,7 +358,11 @@ fn texture(t: &Texture) -> Json {
     let mut out = match &t.image {
         ImageSource::File(file) => json!({"file": file}),
         ImageSource::Memory(image) => json!({"data": base64::encode(&image.bytes)}),
+        ImageSource::White => json!({}),
     };
+    if t.vertex_color || t.image == ImageSource::White {
+        out["vertex_color"] = json!(t.vertex_color);
+    }
     out["color_space"] = json!(word(&COLOR_SPACES, t.color_space));
     let [u, v] = t.wrap.map(|w| word(&WRAPS, w));
     if u == v {
@@ -424,6 +428,12 @@ fn shape(s: &Shape) -> Json {
             }
             if !m.uvs.is_empty() {
                 out["uvs"] = json!(m.uvs);
+            }
+            if !m.colors.is_empty() {
+                out["colors"] = json!(m.colors);
+            }
+            if !m.tangents.is_empty() {
+                out["tangents"] = json!(m.tangents);
             }
             put_transform(&mut out, &m.transform);
             out

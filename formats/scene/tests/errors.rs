@@ -107,6 +107,16 @@ fn keys_and_names() {
         r#"full.json:12:23: $.film.aovs[1]: unknown name "albedos"; did you mean "albedo"?"#,
     );
     expect(
+        "\"samples\", \"orders:4\"",
+        "\"samples\", \"orders:4.5\"",
+        r#"full.json:12:63: $.film.aovs[5]: "orders:4.5" is no layer; orders are asked for as "orders:N", N from 0 to 99"#,
+    );
+    expect(
+        "\"samples\", \"orders:4\"",
+        "\"orders:3\", \"orders:4\"",
+        r#"full.json:12:64: $.film.aovs[5]: "orders:4" is named twice"#,
+    );
+    expect(
         "\"interior\": \"fog\"},\n    {\"type\": \"rectangle\"",
         "\"interior\": \"frog\"},\n    {\"type\": \"rectangle\"",
         r#"full.json:40:70: $.shapes[0].interior: no medium is named "frog"; did you mean "fog"?"#,

@@ -42,7 +42,9 @@ fn every_key_arrives() {
             sigma: 0.6
         }
     );
-    assert_eq!(s.film.aovs, Aov::ALL);
+    assert_eq!(s.film.aovs[..5], Aov::NAMED);
+    assert_eq!(s.film.aovs[5..], [Aov::Orders(4)]);
+    assert_eq!(s.film.order_layers(), 6);
     assert_eq!(
         s.sampling,
         Sampling {
@@ -321,6 +323,59 @@ fn large_meshes_are_written_line_by_line() {
     let text = scene.to_text().unwrap();
     assert!(text.lines().all(|l| l.len() < 120));
     assert_eq!(scene, parse(&text));
+}
+
+/// Colours and tangents of vertices, and the textures that use them.
+#[test]
+fn colours_of_vertices() {
+    let text = r#"{
+      "resolvent": 1,
+      "camera": {"type": "perspective", "origin": [0, 0, 9], "target": [0, 0, 0], "fov_x_deg": 40},
+      "textures": {
+        "paint": {"vertex_color": true, "scale": 0.5},
+        "wood": {"file": "wood.png", "vertex_color": true}
+      },
+      "materials": {"m": {"plugin": "diffuse", "params": {"reflectance": {"texture": "paint"}}}},
+      "shapes": [{
+        "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "indices": [[0, 1, 2]],
+        "colors": [[1, 0, 0], [0, 1, 0, 0.5], [0, 0, 4]],
+        "tangents": [[1, 0, 0, 1], [1, 0, 0, 1], [1, 0, 0, -1]], "material": "m"
+      }]
+    }"#;
+    let scene = parse(text);
+    let Geometry::Mesh(mesh) = &scene.shapes[0].geometry else {
+        panic!()
+    };
+    assert_eq!(mesh.colors[0], [1.0, 0.0, 0.0, 1.0]);
+    assert_eq!(mesh.colors[1], [0.0, 1.0, 0.0, 0.5]);
+    assert_eq!(mesh.tangents[2], [1.0, 0.0, 0.0, -1.0]);
+    let paint = &scene.textures["paint"];
+    assert!(paint.vertex_color && paint.image == ImageSource::White);
+    assert!(scene.textures["wood"].vertex_color);
+    assert_eq!(scene, parse(&scene.to_text().unwrap()));
+    for (good, bad, error) in [
+        (
+            "[0, 0, 4]]",
+            "[0, 0]]",
+            "three numbers (RGB) or four (RGBA)",
+        ),
+        (
+            ", [0, 0, 4]]",
+            "]",
+            "expected one per position (3), found 2",
+        ),
+        (
+            "\"vertex_color\": true, \"scale\"",
+            "\"scale\"",
+            "vertex_color",
+        ),
+    ] {
+        let text = text.replacen(good, bad, 1);
+        let found = Scene::parse(text.as_bytes(), "a.json")
+            .unwrap_err()
+            .to_string();
+        assert!(found.contains(error), "{found}");
+    }
 }
 
 #[test]

@@ -80,7 +80,7 @@ impl Lights {
                 vertex.primitive = [area.shape, at.prim];
                 vertex.wo = d.into();
                 // It may be dark in this direction and seen from another: the ray counts, even if it carries nothing.
-                let radiance = area.radiance_towards(at.uv, d);
+                let radiance = area.radiance_towards(at.uv, &at.color, d);
                 vertex.uv = at.uv;
                 vertex.emitted = radiance;
                 let o = offset_origin(at.p, at.error(), at.ng, d);
@@ -151,7 +151,8 @@ impl Lights {
                 let w = (to.position() - light.position()).normalize_or_zero();
                 let shows = area.two_sided || w.dot(light.ng.into()) > 0.0;
                 if shows {
-                    area.radiance_towards(light.uv, w)
+                    let color = area.color_at(light.primitive[1], light.position());
+                    area.radiance_towards(light.uv, &color, w)
                 } else {
                     Spectrum::ZERO
                 }

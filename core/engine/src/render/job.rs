@@ -126,7 +126,7 @@ impl<'j> Job<'j> {
             features: u32::from(s.features),
             margin: (self.scene.camera.filter().radius() - 0.5).max(0.0),
         };
-        let done = piece::render(self.scene, self.integrator, &tile)
+        let done = piece::render(self.scene, self.integrator, &tile, s.orders)
             .and_then(|finished| self.add(finished, index, into));
         if let Err(why) = done {
             self.fail(why);

@@ -393,7 +393,8 @@ unsafe extern "C" fn emit(
         Some(mut ray) => {
             // Lights at infinity stand outside everything.
             if !vertex.is_infinite() {
-                ray.inside = scene.interiors_at(ray.o.into());
+                let start = scene.starts.get(vertex.light as usize).copied().flatten();
+                ray.inside = start.unwrap_or_else(|| scene.interiors_at(ray.o.into()));
             }
             // SAFETY: as above.
             unsafe { *out = ray };

@@ -22,11 +22,10 @@ pub fn read_environment(path: &Path, mapping: Mapping) -> Result<Rgb> {
     let mut described = describe::Texture::new(ImageSource::File(String::new()));
     described.wrap = [describe::Wrap::Clamp; 2];
     let (width, height) = (texels.width, texels.height);
-    let image = Texture::new(Arc::new(texels), &described);
+    let image = Texture::new(Some(Arc::new(texels)), &described);
     let rgb = |v: [f32; 4]| [v[0], v[1], v[2]];
     if mapping == Mapping::LatLong {
-        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let texels = texels.map(|(x, y)| rgb(image.decoded(x, y))).collect();
+        let texels = image.decoded().map(rgb).collect();
         return Ok((width, height, texels));
     }
     let rows = match mapping {
@@ -44,7 +43,7 @@ pub fn read_environment(path: &Path, mapping: Mapping) -> Result<Rgb> {
                 let turn = 2.0 * PI * (0.5 - (x as f64 + 0.5) / columns as f64);
                 let w = [sin * turn.sin(), cos, sin * turn.cos()];
                 let [u, v] = place(mapping, w, [1.0 / width as f64, 1.0 / height as f64]);
-                *texel = rgb(image.at([u as f32, 1.0 - v as f32]));
+                *texel = rgb(image.at([u as f32, 1.0 - v as f32], &[1.0; 4]));
             }
         });
     Ok((columns, rows, out))

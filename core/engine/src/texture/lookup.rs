@@ -16,9 +16,20 @@ enum Curve {
     Formula,
 }
 
-/// An image and how it is read.
+/// What the values of a texture come from.
+enum Pixels {
+    /// No image: white everywhere.
+    White,
+    /// One image.
+    Image(Arc<Texels>),
+    /// Images of unit squares, by column + 10 row.
+    Tiles(Box<[Option<Texture>]>),
+}
+
+/// An image, or several side by side, and how it is read.
 pub struct Texture {
-    texels: Arc<Texels>,
+    pixels: Pixels,
+    vertex_color: bool,
     curve: Curve,
     wrap: [Wrap; 2],
     nearest: bool,
@@ -27,29 +38,32 @@ pub struct Texture {
     bias: [f32; 3],
     /// Rows of the map from the surface's coordinates to the image's.
     uv: [[f32; 3]; 2],
-    /// Tiles by column + 10 row, in place of `texels`.
-    tiles: Option<Box<[Option<Texture>]>>,
 }
 
 /// Columns of tiles.
 pub(super) const COLUMNS: usize = 10;
+/// The colour of meshes that have none.
+const WHITE: [f32; 4] = [1.0; 4];
 
 impl Texture {
-    /// The image `texels` with the settings of `t`.
-    pub fn new(texels: Arc<Texels>, t: &describe::Texture) -> Self {
-        let srgb = match t.color_space {
-            ColorSpace::Auto => !texels.data.is_float(),
-            ColorSpace::Srgb => true,
-            ColorSpace::Linear => false,
-        };
-        let curve = match (&texels.data, srgb) {
-            (_, false) => Curve::None,
-            (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
-            (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
-            (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
-        };
+    /// The image `texels` (white without one) with the settings of `t`.
+    pub fn new(texels: Option<Arc<Texels>>, t: &describe::Texture) -> Self {
+        let curve = texels.as_ref().map_or(Curve::None, |texels| {
+            let srgb = match t.color_space {
+                ColorSpace::Auto => !texels.data.is_float(),
+                ColorSpace::Srgb => true,
+                ColorSpace::Linear => false,
+            };
+            match (&texels.data, srgb) {
+                (_, false) => Curve::None,
+                (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
+                (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
+                (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
+            }
+        });
         Self {
-            texels,
+            pixels: texels.map_or(Pixels::White, Pixels::Image),
+            vertex_color: t.vertex_color,
             curve,
             wrap: t.wrap,
             nearest: t.filter == TextureFilter::Nearest,
@@ -62,82 +76,82 @@ impl Texture {
             scale: t.scale.map(|v| v as f32),
             bias: t.bias.map(|v| v as f32),
             uv: t.uv.rows().map(|row| row.map(|v| v as f32)),
-            tiles: None,
         }
     }
 
     /// Tiles by column + 10 row, with the settings of `t`.
     pub fn tiled(tiles: Vec<Option<Arc<Texels>>>, t: &describe::Texture) -> Self {
+        // What is done to values is done once, to those of the whole.
         let settings = describe::Texture {
             uv: describe::UvTransform::default(),
             wrap: [Wrap::Clamp; 2],
+            channel: None,
+            scale: [1.0; 3],
+            bias: [0.0; 3],
+            vertex_color: false,
             ..t.clone()
         };
-        let nothing = Texels {
-            width: 1,
-            height: 1,
-            channels: 4,
-            data: TexelData::U8(vec![0; 4]),
-        };
-        let tile = |texels: Option<Arc<Texels>>| texels.map(|x| Self::new(x, &settings));
+        let tile = |texels: Option<Arc<Texels>>| texels.map(|x| Self::new(Some(x), &settings));
         Self {
-            tiles: Some(tiles.into_iter().map(tile).collect()),
-            ..Self::new(Arc::new(nothing), t)
+            pixels: Pixels::Tiles(tiles.into_iter().map(tile).collect()),
+            ..Self::new(None, t)
         }
     }
 
-    /// Red, green, blue and alpha at the surface's texture coordinates.
+    /// Red, green, blue and alpha at the surface's texture coordinates, where the mesh has the colour `color`.
     #[inline]
-    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
-        if let Some(tiles) = &self.tiles {
-            return self.tile(tiles, x, y);
-        }
-        // The image's rows go down, its coordinates up.
-        let (x, y) = (self.along(0, x), self.along(1, 1.0 - y));
-        let v = if self.nearest {
-            self.texel(x.nearest(), y.nearest())
-        } else {
-            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
-            let (a, b) = (self.texel(x0, y0), self.texel(x1, y0));
-            let (c, d) = (self.texel(x0, y1), self.texel(x1, y1));
-            // Equal texels give exactly their value.
-            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
-            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
+    pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
+        let place = || self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+        let mut v = match &self.pixels {
+            Pixels::White => WHITE,
+            Pixels::Image(texels) => self.image(texels, place()),
+            Pixels::Tiles(tiles) => tile(tiles, place()),
         };
+        if self.vertex_color {
+            v.iter_mut().zip(color).for_each(|(v, c)| *v *= c);
+        }
         self.finish(v)
     }
 
-    /// The value on the tile that lies under (x, y).
-    fn tile(&self, tiles: &[Option<Texture>], x: f32, y: f32) -> [f32; 4] {
-        let (column, row) = (x.floor(), y.floor());
-        let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
-        let index = row as usize * COLUMNS + column as usize;
-        match tiles.get(index) {
-            Some(Some(tile)) if lies => tile.at([x - column, y - row]),
-            _ => self.finish([0.0; 4]),
+    #[inline(always)]
+    fn image(&self, texels: &Texels, [x, y]: [f32; 2]) -> [f32; 4] {
+        // The image's rows go down, its coordinates up.
+        let x = Along::new(x, texels.width, self.wrap[0]);
+        let y = Along::new(1.0 - y, texels.height, self.wrap[1]);
+        if self.nearest {
+            self.texel(texels, x.nearest(), y.nearest())
+        } else {
+            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
+            let [a, b, c, d] =
+                [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].map(|(x, y)| self.texel(texels, x, y));
+            // Equal texels give exactly their value.
+            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
+            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
         }
     }
 
-    /// Mean over the texels of red, green, blue and alpha after `bound`.
+    /// Mean over the texels of red, green, blue and alpha after `bound`, where the mesh is white.
     pub fn mean(&self, bound: &dyn Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
         let mut sum = [0f64; 4];
-        if let Some(tiles) = &self.tiles {
-            let n = tiles.iter().flatten().count().max(1) as f64;
-            for tile in tiles.iter().flatten() {
-                let v = tile.mean(bound);
-                (0..4).for_each(|i| sum[i] += f64::from(v[i]) / n);
+        let mut add = |v: [f32; 4], n: usize| {
+            (0..4).for_each(|i| sum[i] += f64::from(v[i]) / n as f64);
+        };
+        let finished = |v| bound(self.finish(v));
+        match &self.pixels {
+            Pixels::White => add(finished(WHITE), 1),
+            Pixels::Image(t) => {
+                for (x, y) in (0..t.height).flat_map(|y| (0..t.width).map(move |x| (x, y))) {
+                    add(finished(self.texel(t, x, y)), t.width * t.height);
+                }
             }
-            return sum.map(|v| v as f32);
-        }
-        for y in 0..self.texels.height {
-            for x in 0..self.texels.width {
-                let v = bound(self.finish(self.texel(x, y)));
-                (0..4).for_each(|i| sum[i] += f64::from(v[i]));
+            Pixels::Tiles(tiles) => {
+                let n = tiles.iter().flatten().count();
+                for tile in tiles.iter().flatten() {
+                    add(tile.mean(&finished), n);
+                }
             }
         }
-        let n = (self.texels.width * self.texels.height) as f64;
-        sum.map(|s| (s / n) as f32)
+        sum.map(|v| v as f32)
     }
 
     /// Channel, factor and offset.
@@ -150,25 +164,20 @@ impl Texture {
         [r, g, b, v[3]]
     }
 
-    #[inline(always)]
-    fn along(&self, axis: usize, coordinate: f32) -> Along {
-        let size = if axis == 0 {
-            self.texels.width
-        } else {
-            self.texels.height
+    /// All texels of the image, decoded, in rows from its top; none without an image of its own.
+    pub fn decoded(&self) -> impl Iterator<Item = [f32; 4]> {
+        let image = match &self.pixels {
+            Pixels::Image(t) => Some(&**t),
+            _ => None,
         };
-        Along::new(coordinate, size, self.wrap[axis])
-    }
-
-    /// The texel in column `x` of row `y`, decoded; both lie in the image.
-    pub fn decoded(&self, x: usize, y: usize) -> [f32; 4] {
-        self.texel(x, y)
+        image.into_iter().flat_map(move |t| {
+            (0..t.height).flat_map(move |y| (0..t.width).map(move |x| self.texel(t, x, y)))
+        })
     }
 
     /// The texel in column `x` of row `y`, decoded; nothing outside of the image.
     #[inline(always)]
-    fn texel(&self, x: usize, y: usize) -> [f32; 4] {
-        let t = &*self.texels;
+    fn texel(&self, t: &Texels, x: usize, y: usize) -> [f32; 4] {
         if x >= t.width || y >= t.height {
             return [0.0; 4];
         }
@@ -201,6 +210,17 @@ impl Texture {
             _ => value(c),
         };
         spread(values, color, &value)
+    }
+}
+
+/// The value on the tile that lies under (x, y), nothing where there is none.
+fn tile(tiles: &[Option<Texture>], [x, y]: [f32; 2]) -> [f32; 4] {
+    let (column, row) = (x.floor(), y.floor());
+    let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
+    let index = row as usize * COLUMNS + column as usize;
+    match tiles.get(index) {
+        Some(Some(tile)) if lies => tile.at([x - column, y - row], &WHITE),
+        _ => [0.0; 4],
     }
 }
 
@@ -318,11 +338,11 @@ mod tests {
         };
         let mut t = described();
         edit(&mut t);
-        Texture::new(Arc::new(texels), &t)
+        Texture::new(Some(Arc::new(texels)), &t)
     }
 
     fn red(t: &Texture, u: f32, v: f32) -> f32 {
-        t.at([u, v])[0]
+        t.at([u, v], &WHITE)[0]
     }
 
     #[test]
@@ -458,22 +478,22 @@ mod tests {
             data: TexelData::U8(vec![0, 128, 255, 128, 255, 128, 0, 0]),
         };
         let srgb = describe::Texture::new(ImageSource::File("x.png".into()));
-        let t = Texture::new(Arc::new(rgba.clone()), &srgb);
+        let t = Texture::new(Some(Arc::new(rgba.clone())), &srgb);
         let half = srgb::linear(128.0 / 255.0) as f32;
-        assert_eq!(t.at([0.25, 0.5]), [0.0, half, 1.0, 128.0 / 255.0]);
-        let middle = t.at([0.5, 0.5]);
+        assert_eq!(t.at([0.25, 0.5], &WHITE), [0.0, half, 1.0, 128.0 / 255.0]);
+        let middle = t.at([0.5, 0.5], &WHITE);
         assert_eq!(middle[0], 0.5);
         assert!((middle[3] - 64.0 / 255.0).abs() < 1e-7);
-        let t = Texture::new(Arc::new(rgba), &described());
-        assert_eq!(t.at([0.25, 0.5])[1], 128.0 / 255.0);
+        let t = Texture::new(Some(Arc::new(rgba)), &described());
+        assert_eq!(t.at([0.25, 0.5], &WHITE)[1], 128.0 / 255.0);
         let wide = Texels {
             width: 1,
             height: 1,
             channels: 3,
             data: TexelData::U16(vec![0, 32_896, 65_535]),
         };
-        let t = Texture::new(Arc::new(wide), &srgb);
-        assert_eq!(t.at([0.3, 0.3]), [0.0, half, 1.0, 1.0]);
+        let t = Texture::new(Some(Arc::new(wide)), &srgb);
+        assert_eq!(t.at([0.3, 0.3], &WHITE), [0.0, half, 1.0, 1.0]);
     }
 
     #[test]
@@ -486,14 +506,14 @@ mod tests {
         });
         let auto = describe::Texture::new(ImageSource::File("x.exr".into()));
         assert_eq!(
-            Texture::new(texels.clone(), &auto).at([0.0, 0.0]),
+            Texture::new(Some(texels.clone()), &auto).at([0.0, 0.0], &WHITE),
             [0.5, -0.5, 4.0, 1.0]
         );
         let srgb = describe::Texture {
             color_space: ColorSpace::Srgb,
             ..auto
         };
-        let v = Texture::new(texels, &srgb).at([0.0, 0.0]);
+        let v = Texture::new(Some(texels), &srgb).at([0.0, 0.0], &WHITE);
         assert_eq!([v[0], v[1]], [0.5, -0.5].map(|x| srgb::linear(x) as f32));
     }
 
@@ -508,12 +528,38 @@ mod tests {
         let mut t = described();
         t.scale = [2.0, -1.0, 0.0];
         t.bias = [0.0, 1.0, 0.125];
-        let grey = Texture::new(texels.clone(), &t);
-        assert_eq!(grey.at([0.25, 0.0]), [0.5, 0.75, 0.125, 0.5]);
+        let grey = Texture::new(Some(texels.clone()), &t);
+        assert_eq!(grey.at([0.25, 0.0], &WHITE), [0.5, 0.75, 0.125, 0.5]);
         assert_eq!(grey.mean(&|v| v), [1.0, 0.5, 0.125, 0.75]);
         t.channel = Some(TextureChannel::Alpha);
-        let alpha = Texture::new(texels, &t);
-        assert_eq!(alpha.at([0.25, 0.0]), [1.0, 0.5, 0.125, 0.5]);
+        let alpha = Texture::new(Some(texels), &t);
+        assert_eq!(alpha.at([0.25, 0.0], &WHITE), [1.0, 0.5, 0.125, 0.5]);
+    }
+
+    /// Vertex colours are factors on texels, alpha included, before a channel is picked; without an image they stand alone.
+    #[test]
+    fn colours_of_vertices() {
+        let texels = Arc::new(Texels {
+            width: 1,
+            height: 1,
+            channels: 2,
+            data: TexelData::F32(vec![0.5, 0.25]),
+        });
+        let color = [0.5, 1.0, 2.0, 0.5];
+        let mut t = described();
+        assert_eq!(
+            Texture::new(Some(texels.clone()), &t).at([0.5; 2], &color),
+            [0.5, 0.5, 0.5, 0.25]
+        );
+        t.vertex_color = true;
+        let product = Texture::new(Some(texels.clone()), &t).at([0.5; 2], &color);
+        assert_eq!(product, [0.25, 0.5, 1.0, 0.125]);
+        assert_eq!(Texture::new(None, &t).at([0.5; 2], &color), color);
+        t.channel = Some(TextureChannel::Alpha);
+        t.scale = [2.0; 3];
+        let alpha = Texture::new(Some(texels), &t).at([0.5; 2], &color);
+        assert_eq!(alpha[..3], [0.25; 3]);
+        assert_eq!(Texture::new(None, &t).mean(&|v| v)[..3], [2.0; 3]);
     }
 
     /// The transform scales, rotates counter-clockwise and moves, in this order.

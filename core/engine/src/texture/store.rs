@@ -22,10 +22,10 @@ impl Binding {
         Self { texture, min, max }
     }
 
-    /// Red, green, blue and alpha: finite, and all but alpha within the parameter's range.
+    /// Red, green, blue and alpha where the mesh has the colour `color`: finite, and all but alpha within the parameter's range.
     #[inline]
-    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        self.bounded(self.texture.at(uv))
+    pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
+        self.bounded(self.texture.at(uv, color))
     }
 
     /// Mean over the texels of the image.
@@ -127,29 +127,33 @@ fn tiles_of(pattern: &Path) -> std::result::Result<Vec<(usize, PathBuf)>, resolv
 }
 
 impl State {
-    /// The texels of an image, read at the first time.
+    /// The texels of an image, read at the first time; `None` for no image.
     fn image(
         &mut self,
         source: &ImageSource,
         scene: &describe::Scene,
-    ) -> std::result::Result<Arc<Texels>, resolvent_image::Error> {
+    ) -> std::result::Result<Option<Arc<Texels>>, resolvent_image::Error> {
         let key = match source {
             ImageSource::File(file) => {
                 let path = scene.resolve(file);
                 Key::File(path.canonicalize().unwrap_or(path))
             }
             ImageSource::Memory(image) => Key::Memory(image.bytes.as_ptr().addr()),
+            ImageSource::White => return Ok(None),
         };
         let index = match self.images.get(&key) {
             Some(index) => *index,
             None => {
-                self.read.push(read(source, scene)?);
+                let Some(image) = read(source, scene)? else {
+                    return Ok(None);
+                };
+                self.read.push(image);
                 let index = self.read.len() - 1;
                 self.images.insert(key, index);
                 index
             }
         };
-        Ok(self.read[index].texels.clone())
+        Ok(Some(self.read[index].texels.clone()))
     }
 }
 
@@ -188,7 +192,7 @@ impl Textures {
                 for (number, path) in tiles_of(&scene.resolve(file)).map_err(problem)? {
                     tiles.resize(tiles.len().max(number + 1), None);
                     let file = ImageSource::File(path.to_string_lossy().into_owned());
-                    tiles[number] = Some(state.image(&file, scene).map_err(problem)?);
+                    tiles[number] = state.image(&file, scene).map_err(problem)?;
                 }
                 Texture::tiled(tiles, described)
             }
@@ -209,8 +213,8 @@ impl Textures {
 fn read(
     source: &ImageSource,
     scene: &describe::Scene,
-) -> std::result::Result<ReadImage, resolvent_image::Error> {
-    Ok(match source {
+) -> std::result::Result<Option<ReadImage>, resolvent_image::Error> {
+    Ok(Some(match source {
         ImageSource::File(file) => {
             let path = scene.resolve(file);
             let (texels, file_bytes) = Texels::read(&path)?;
@@ -227,5 +231,6 @@ fn read(
             texels: Arc::new(Texels::parse(&image.bytes, &image.name, Limits::default())?),
             _bytes: Some(image.bytes.clone()),
         },
-    })
+        ImageSource::White => return Ok(None),
+    }))
 }
