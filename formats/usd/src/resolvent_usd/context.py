@@ -35,7 +35,6 @@ class Options:
     curve_sides: int = 6
     """Sides of the tubes that curves become."""
     keep_going: bool = False
-    strict: bool = False
 
 
 @dataclass(frozen=True)
