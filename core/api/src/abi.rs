@@ -562,6 +562,14 @@ pub struct SceneTable {
         to: *const Vertex,
         out: *mut [f32; 2],
     ) -> Status,
+    /// Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
+    /// lights that no ray can meet. Since minor version 2: there if `size` reaches it.
+    pub radiance: unsafe extern "C" fn(
+        ctx: *const c_void,
+        light: *const Vertex,
+        to: *const Vertex,
+        out: *mut Spectrum,
+    ) -> Status,
 }
 
 /// Features of a pixel sample beyond its radiance; filled if [`Tile::features`] asks for them.

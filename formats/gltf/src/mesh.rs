@@ -152,6 +152,7 @@ fn shape(mesh: Mesh, material: &Converted) -> Shape {
         emission: material.emission,
         emission_texture: material.emission_texture.clone(),
         two_sided: material.two_sided && material.emission.is_some(),
+        shaping: None,
         interior: material.interior.clone(),
         priority: 0,
     }

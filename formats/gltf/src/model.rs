@@ -3,7 +3,8 @@
 use gltf::json;
 use gltf::json::validation::Checked;
 use resolvent_scene::{
-    Camera, Geometry, IndexMap, Light, Material, Medium, Pose, Shape, Texture, Transform,
+    Camera, Geometry, IndexMap, Light, Material, Medium, Pose, Projection, Shape, Texture,
+    Transform,
 };
 use serde_json::Value;
 use std::path::Path;
@@ -352,9 +353,11 @@ fn view(
         name,
         camera: Camera {
             pose: Pose::Transform(pose),
-            fov_x_deg,
+            projection: Projection::Perspective { fov_x_deg },
             lens_radius: 0.0,
             focus_distance: 1.0,
+            shift: [0.0; 2],
+            exposure: 0.0,
         },
         aspect,
     })

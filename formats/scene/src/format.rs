@@ -211,7 +211,11 @@ pub(crate) static SCENE: Object = Object {
             Kind::Object(&UNITS),
             "Physical meaning of the lengths",
         ),
-        need("camera", Kind::Variants(&[&PERSPECTIVE]), "The camera"),
+        need(
+            "camera",
+            Kind::Variants(&[&PERSPECTIVE, &ORTHOGRAPHIC]),
+            "The camera",
+        ),
         may(
             "film",
             Kind::Object(&FILM),
@@ -281,7 +285,12 @@ static INSTANCE: Object = Object {
         may(
             "transform",
             Kind::Transform,
-            "The prototype's space to world",
+            "The prototype's space to world; with transforms, applied after each of them",
+        ),
+        may(
+            "transforms",
+            Kind::Name,
+            "A NumPy file (.npy) of many copies' transforms: f32 or f64 of shape (n, 3, 4) or (n, 4, 4), rows of matrices that act on column vectors",
         ),
         may(
             "material",
@@ -303,22 +312,37 @@ static UNITS: Object = Object {
     rules: &[],
 };
 
+const ORIGIN: Field = may("origin", Kind::Vec3, "Where the camera stands");
+const TARGET: Field = may("target", Kind::Vec3, "A point in the middle of the picture");
+const UP: Field = may(
+    "up",
+    Kind::Vec3,
+    "A direction that is up in the picture ([0, 1, 0])",
+);
+const CAMERA_TO_WORLD: Field = may(
+    "transform",
+    Kind::Transform,
+    "Camera to world; it looks along -z, y is up",
+);
+const SHIFT: Field = may(
+    "shift",
+    Kind::Pair,
+    "How far the picture's middle lies off the viewing axis, to the right and up, in widths and heights of the picture ([0, 0])",
+);
+const EXPOSURE: Field = may(
+    "exposure",
+    Kind::Number(Range::closed(-100.0, 100.0)),
+    "Stops: the picture is multiplied by 2^exposure (0)",
+);
+
 static PERSPECTIVE: Object = Object {
     name: "perspective",
     help: "A pinhole camera, or a thin lens if lens_radius > 0",
     fields: &[
-        may("origin", Kind::Vec3, "Where the camera stands"),
-        may("target", Kind::Vec3, "A point in the middle of the picture"),
-        may(
-            "up",
-            Kind::Vec3,
-            "A direction that is up in the picture ([0, 1, 0])",
-        ),
-        may(
-            "transform",
-            Kind::Transform,
-            "Camera to world; it looks along -z, y is up",
-        ),
+        ORIGIN,
+        TARGET,
+        UP,
+        CAMERA_TO_WORLD,
         need(
             "fov_x_deg",
             Kind::Number(Range::open(0.0, 180.0)),
@@ -334,14 +358,37 @@ static PERSPECTIVE: Object = Object {
             Kind::Number(Range::above(0.0, FAR)),
             "Distance to the plane in focus (the distance to the target)",
         ),
+        SHIFT,
+        EXPOSURE,
     ],
-    rules: &[
-        Rule::ExactlyOne(&["origin", "transform"]),
-        Rule::Needs("origin", "target"),
-        Rule::AtMostOne(&["target", "transform"]),
-        Rule::AtMostOne(&["up", "transform"]),
-    ],
+    rules: &POSE,
 };
+
+static ORTHOGRAPHIC: Object = Object {
+    name: "orthographic",
+    help: "A camera with parallel rays, which start on the plane through its origin",
+    fields: &[
+        ORIGIN,
+        TARGET,
+        UP,
+        CAMERA_TO_WORLD,
+        need(
+            "width",
+            Kind::Number(Range::above(0.0, FAR)),
+            "Width of the picture in scene units",
+        ),
+        SHIFT,
+        EXPOSURE,
+    ],
+    rules: &POSE,
+};
+
+const POSE: [Rule; 4] = [
+    Rule::ExactlyOne(&["origin", "transform"]),
+    Rule::Needs("origin", "target"),
+    Rule::AtMostOne(&["target", "transform"]),
+    Rule::AtMostOne(&["up", "transform"]),
+];
 
 static FILM: Object = Object {
     name: "film",
@@ -351,6 +398,11 @@ static FILM: Object = Object {
             "resolution",
             Kind::Integers(2, 1, 65_536),
             "Width and height in pixels ([1280, 720])",
+        ),
+        may(
+            "pixel_aspect",
+            Kind::Number(Range::closed(0.01, 100.0)),
+            "Width of a pixel over its height (1)",
         ),
         may(
             "crop",
@@ -465,7 +517,7 @@ static NORMAL_MAP: Object = Object {
     rules: &[],
 };
 
-const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror"]);
+const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror", "black"]);
 
 static TEXTURE: Object = Object {
     name: "texture",
@@ -474,7 +526,7 @@ static TEXTURE: Object = Object {
         may(
             "file",
             Kind::Name,
-            "The image file, relative to the scene file",
+            "The image file, relative to the scene file; <UDIM> in it stands for the numbers of its tiles, 1001 + column + 10 row",
         ),
         may("data", Kind::Name, "The image file's bytes in base64"),
         may(
@@ -560,13 +612,23 @@ static ENVIRONMENT: Object = Object {
         may(
             "image",
             Kind::Name,
-            "Latitude-longitude image; +y is up, its centre is +z",
+            "Image of all directions; +y is up, its centre is +z",
+        ),
+        may(
+            "mapping",
+            Kind::Choice(&["latlong", "mirrored_ball", "angular", "vertical_cross"]),
+            "How the image shows the directions (latlong)",
         ),
         may("scale", Kind::Spectrum, "Factor on the image (1)"),
-        may("transform", Kind::Transform, "Image to world: a rotation"),
+        may(
+            "transform",
+            Kind::Transform,
+            "Image to world: a rotation, or one that mirrors",
+        ),
     ],
     rules: &[
         Rule::ExactlyOne(&["radiance", "image"]),
+        Rule::Needs("mapping", "image"),
         Rule::Needs("scale", "image"),
         Rule::Needs("transform", "image"),
     ],
@@ -703,6 +765,39 @@ static RECTANGLE_LIGHT: Object = Object {
     rules: &[],
 };
 
+static SHAPING: Object = Object {
+    name: "shaping",
+    help: "A factor on emission: a cone about an axis, and tint + (1 - tint) |cos|^focus of the angle from it",
+    fields: &[
+        need(
+            "axis",
+            Kind::Vec3,
+            "Direction in which most is emitted, in world or in the prototype's space",
+        ),
+        may(
+            "angle_deg",
+            Kind::Number(Range::above(0.0, 360.0)),
+            "Full angle of the cone in degrees; 360 is none (360)",
+        ),
+        may(
+            "softness",
+            Kind::Number(Range::closed(0.0, 1.0)),
+            "Share of the cone's half angle over which the emission falls to 0 as a smoothstep of the angle (0)",
+        ),
+        may(
+            "focus",
+            Kind::Number(Range::closed(0.0, 1e6)),
+            "Power of the cosine (0)",
+        ),
+        may(
+            "focus_tint",
+            Kind::Spectrum,
+            "Factor that remains where the power of the cosine is 0: one number or RGB (0)",
+        ),
+    ],
+    rules: &[],
+};
+
 const MATERIAL_NAME: Field = may("material", Kind::Name, "Name of a material");
 const EMISSION: Field = may(
     "emission",
@@ -715,6 +810,11 @@ const EMISSION_TEXTURE: Field = may(
     "Name of a texture that the emission is multiplied with",
 );
 const TWO_SIDED: Field = may("two_sided", Kind::Bool, "Emits from both sides (false)");
+const SHAPING_KEY: Field = may(
+    "shaping",
+    Kind::Object(&SHAPING),
+    "Directions that the emission favours",
+);
 const INTERIOR: Field = may(
     "interior",
     Kind::Name,
@@ -736,12 +836,14 @@ static SPHERE: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -764,12 +866,14 @@ static RECTANGLE: Object = Object {
         EMISSION,
         EMISSION_TEXTURE,
         TWO_SIDED,
+        SHAPING_KEY,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission"]),
         Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -783,12 +887,14 @@ static DISK: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -806,12 +912,14 @@ static CYLINDER: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -842,6 +950,7 @@ static MESH: Object = Object {
         EMISSION,
         EMISSION_TEXTURE,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
@@ -849,6 +958,7 @@ static MESH: Object = Object {
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -864,13 +974,25 @@ static GLTF: Object = Object {
             "Name of a material in place of the model's",
         ),
         may(
+            "emission",
+            Kind::Spectrum,
+            "Radiance emitted from the outer side in place of the model's: one number or RGB",
+        ),
+        EMISSION_TEXTURE,
+        TWO_SIDED,
+        SHAPING_KEY,
+        may(
             "interior",
             Kind::Name,
             "Name of a medium in place of the model's",
         ),
         PRIORITY,
     ],
-    rules: &[],
+    rules: &[
+        Rule::Needs("emission_texture", "emission"),
+        Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
+    ],
 };
 
 static PLY: Object = Object {
@@ -887,6 +1009,7 @@ static PLY: Object = Object {
         EMISSION,
         EMISSION_TEXTURE,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
@@ -894,6 +1017,7 @@ static PLY: Object = Object {
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 

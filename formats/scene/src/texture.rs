@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::describe::Vec3;
+use crate::describe::{Mapping, Vec3};
 use crate::error::Place;
 
 /// An image and how it is read at texture coordinates (u, v). The image covers the unit square: (0, 0) is its lower left
@@ -59,7 +59,9 @@ impl Texture {
 /// Where an image is. PNG, JPEG, OpenEXR and Radiance HDR are read; what it is, its first bytes say.
 #[derive(Clone, PartialEq)]
 pub enum ImageSource {
-    /// A file, as the scene names it; see [`crate::Scene::resolve`].
+    /// A file, as the scene names it; see [`crate::Scene::resolve`]. `<UDIM>` in its name stands for the numbers of tiles that
+    /// lie side by side: the unit square whose lower left corner is (i, j), 0 ≤ i < 10, shows the file with the number
+    /// 1001 + i + 10 j, and nothing (0) if there is none. Between tiles nothing is interpolated.
     File(String),
     /// The bytes of an image file.
     Memory(MemoryImage),
@@ -114,6 +116,8 @@ pub enum Wrap {
     Clamp,
     /// Its mirror image.
     Mirror,
+    /// Nothing: 0 in all channels, before factor and offset.
+    Black,
 }
 
 /// What lies between the middles of texels.
@@ -186,10 +190,11 @@ pub(crate) const COLOR_SPACES: [(&str, ColorSpace); 4] = [
     ("linear", ColorSpace::Linear),
     ("raw", ColorSpace::Linear),
 ];
-pub(crate) const WRAPS: [(&str, Wrap); 3] = [
+pub(crate) const WRAPS: [(&str, Wrap); 4] = [
     ("repeat", Wrap::Repeat),
     ("clamp", Wrap::Clamp),
     ("mirror", Wrap::Mirror),
+    ("black", Wrap::Black),
 ];
 pub(crate) const FILTERS: [(&str, TextureFilter); 2] = [
     ("bilinear", TextureFilter::Bilinear),
@@ -200,6 +205,13 @@ pub(crate) const CHANNELS: [(&str, TextureChannel); 4] = [
     ("g", TextureChannel::Green),
     ("b", TextureChannel::Blue),
     ("a", TextureChannel::Alpha),
+];
+
+pub(crate) const MAPPINGS: [(&str, Mapping); 4] = [
+    ("latlong", Mapping::LatLong),
+    ("mirrored_ball", Mapping::MirroredBall),
+    ("angular", Mapping::Angular),
+    ("vertical_cross", Mapping::VerticalCross),
 ];
 
 /// What a word stands for.

@@ -15,6 +15,7 @@ mod scenes;
 
 mod instances;
 mod lights;
+mod limits;
 mod materials;
 mod nested;
 mod orders;

@@ -80,8 +80,8 @@ fn recompute(media: MediaDensities, heuristic: Heuristic, samples: u32) {
     let found = paths.verified.unwrap_or_default();
     let [value, density, sum] = found.worst;
     println!(
-        "weights, {media:?} {heuristic:?}: {} paths (surfaces, media, mixed: {kinds:?}), contributions off by up to \
-         {value:.1e}, densities by {density:.1e}, sums of weights by {sum:.1e} ({} by more than 1e-6)",
+        "weights, {media:?} {heuristic:?}: {} paths (surfaces, media, mixed: {kinds:?}); of what is allowed, contributions are off \
+         by {value:.2}, densities by {density:.2}, sums of weights by {sum:.2} ({} by more than 1e-6)",
         found.paths, found.loose
     );
     assert!(kinds.iter().all(|k| *k > 100), "{kinds:?}");

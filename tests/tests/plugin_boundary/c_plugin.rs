@@ -98,7 +98,7 @@ fn layouts_agree() {
             "kind" = kind, "count" = count, "numbers" = numbers, "text" = text, "header" = header, "instance" = instance
         },
         "host": HostTable {
-            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture
+            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture, "texture_at" = texture_at
         },
         "create_args": CreateArgs { "params" = params, "host" = host, "to_world" = to_world, "lanes" = lanes },
         "scatter_draws": ScatterDraws {},

@@ -16,10 +16,19 @@ enum Curve {
     Formula,
 }
 
-/// An image and how it is read.
+/// What the values of a texture come from.
+enum Pixels {
+    /// No image: white everywhere.
+    White,
+    /// One image.
+    Image(Arc<Texels>),
+    /// Images of unit squares, by column + 10 row.
+    Tiles(Box<[Option<Texture>]>),
+}
+
+/// An image, or several side by side, and how it is read.
 pub struct Texture {
-    /// Without an image it is white.
-    texels: Option<Arc<Texels>>,
+    pixels: Pixels,
     vertex_color: bool,
     curve: Curve,
     wrap: [Wrap; 2],
@@ -31,8 +40,13 @@ pub struct Texture {
     uv: [[f32; 3]; 2],
 }
 
+/// Columns of tiles.
+pub(super) const COLUMNS: usize = 10;
+/// The colour of meshes that have none.
+const WHITE: [f32; 4] = [1.0; 4];
+
 impl Texture {
-    /// The image `texels` with the settings of `t`.
+    /// The image `texels` (white without one) with the settings of `t`.
     pub fn new(texels: Option<Arc<Texels>>, t: &describe::Texture) -> Self {
         let curve = texels.as_ref().map_or(Curve::None, |texels| {
             let srgb = match t.color_space {
@@ -48,7 +62,7 @@ impl Texture {
             }
         });
         Self {
-            texels,
+            pixels: texels.map_or(Pixels::White, Pixels::Image),
             vertex_color: t.vertex_color,
             curve,
             wrap: t.wrap,
@@ -65,12 +79,33 @@ impl Texture {
         }
     }
 
+    /// Tiles by column + 10 row, with the settings of `t`.
+    pub fn tiled(tiles: Vec<Option<Arc<Texels>>>, t: &describe::Texture) -> Self {
+        // What is done to values is done once, to those of the whole.
+        let settings = describe::Texture {
+            uv: describe::UvTransform::default(),
+            wrap: [Wrap::Clamp; 2],
+            channel: None,
+            scale: [1.0; 3],
+            bias: [0.0; 3],
+            vertex_color: false,
+            ..t.clone()
+        };
+        let tile = |texels: Option<Arc<Texels>>| texels.map(|x| Self::new(Some(x), &settings));
+        Self {
+            pixels: Pixels::Tiles(tiles.into_iter().map(tile).collect()),
+            ..Self::new(None, t)
+        }
+    }
+
     /// Red, green, blue and alpha at the surface's texture coordinates, where the mesh has the colour `color`.
     #[inline]
     pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
-        let mut v = match &self.texels {
-            Some(texels) => self.image(texels, uv),
-            None => [1.0; 4],
+        let place = || self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+        let mut v = match &self.pixels {
+            Pixels::White => WHITE,
+            Pixels::Image(texels) => self.image(texels, place()),
+            Pixels::Tiles(tiles) => tile(tiles, place()),
         };
         if self.vertex_color {
             v.iter_mut().zip(color).for_each(|(v, c)| *v *= c);
@@ -79,8 +114,7 @@ impl Texture {
     }
 
     #[inline(always)]
-    fn image(&self, texels: &Texels, uv: [f32; 2]) -> [f32; 4] {
-        let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+    fn image(&self, texels: &Texels, [x, y]: [f32; 2]) -> [f32; 4] {
         // The image's rows go down, its coordinates up.
         let x = Along::new(x, texels.width, self.wrap[0]);
         let y = Along::new(1.0 - y, texels.height, self.wrap[1]);
@@ -97,19 +131,27 @@ impl Texture {
     }
 
     /// Mean over the texels of red, green, blue and alpha after `bound`, where the mesh is white.
-    pub fn mean(&self, bound: impl Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
-        let Some(texels) = &self.texels else {
-            return bound(self.finish([1.0; 4]));
-        };
+    pub fn mean(&self, bound: &dyn Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
         let mut sum = [0f64; 4];
-        for y in 0..texels.height {
-            for x in 0..texels.width {
-                let v = bound(self.finish(self.texel(texels, x, y)));
-                (0..4).for_each(|i| sum[i] += f64::from(v[i]));
+        let mut add = |v: [f32; 4], n: usize| {
+            (0..4).for_each(|i| sum[i] += f64::from(v[i]) / n as f64);
+        };
+        let finished = |v| bound(self.finish(v));
+        match &self.pixels {
+            Pixels::White => add(finished(WHITE), 1),
+            Pixels::Image(t) => {
+                for (x, y) in (0..t.height).flat_map(|y| (0..t.width).map(move |x| (x, y))) {
+                    add(finished(self.texel(t, x, y)), t.width * t.height);
+                }
+            }
+            Pixels::Tiles(tiles) => {
+                let n = tiles.iter().flatten().count();
+                for tile in tiles.iter().flatten() {
+                    add(tile.mean(&finished), n);
+                }
             }
         }
-        let n = (texels.width * texels.height) as f64;
-        sum.map(|s| (s / n) as f32)
+        sum.map(|v| v as f32)
     }
 
     /// Channel, factor and offset.
@@ -122,9 +164,23 @@ impl Texture {
         [r, g, b, v[3]]
     }
 
-    /// The texel in column `x` of row `y`, decoded.
+    /// All texels of the image, decoded, in rows from its top; none without an image of its own.
+    pub fn decoded(&self) -> impl Iterator<Item = [f32; 4]> {
+        let image = match &self.pixels {
+            Pixels::Image(t) => Some(&**t),
+            _ => None,
+        };
+        image.into_iter().flat_map(move |t| {
+            (0..t.height).flat_map(move |y| (0..t.width).map(move |x| self.texel(t, x, y)))
+        })
+    }
+
+    /// The texel in column `x` of row `y`, decoded; nothing outside of the image.
     #[inline(always)]
     fn texel(&self, t: &Texels, x: usize, y: usize) -> [f32; 4] {
+        if x >= t.width || y >= t.height {
+            return [0.0; 4];
+        }
         let first = (y * t.width + x) * t.channels;
         let range = first..first + t.channels;
         match &t.data {
@@ -157,6 +213,17 @@ impl Texture {
     }
 }
 
+/// The value on the tile that lies under (x, y), nothing where there is none.
+fn tile(tiles: &[Option<Texture>], [x, y]: [f32; 2]) -> [f32; 4] {
+    let (column, row) = (x.floor(), y.floor());
+    let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
+    let index = row as usize * COLUMNS + column as usize;
+    match tiles.get(index) {
+        Some(Some(tile)) if lies => tile.at([x - column, y - row], &WHITE),
+        _ => [0.0; 4],
+    }
+}
+
 /// One to four channels as four.
 #[inline(always)]
 fn spread<C>(channels: &[C], color: impl Fn(&C) -> f32, alpha: impl Fn(&C) -> f32) -> [f32; 4] {
@@ -174,6 +241,9 @@ fn spread<C>(channels: &[C], color: impl Fn(&C) -> f32, alpha: impl Fn(&C) -> f3
         [] => [0.0; 4],
     }
 }
+
+/// An index beyond every image.
+const OUTSIDE: usize = usize::MAX;
 
 /// A position along one axis of an image, wrapped: in texels from the first one's outer edge.
 #[derive(Clone, Copy)]
@@ -195,6 +265,8 @@ impl Along {
         let unit = match wrap {
             Wrap::Repeat => c - c.floor(),
             Wrap::Clamp => c.clamp(0.0, 1.0),
+            // Further out there is no more than one image away.
+            Wrap::Black => c.clamp(-1.0, 2.0),
             Wrap::Mirror => {
                 let period = c - 2.0 * (0.5 * c).floor();
                 if period > 1.0 { 2.0 - period } else { period }
@@ -210,6 +282,9 @@ impl Along {
     /// The texel whose square it lies in.
     #[inline(always)]
     fn nearest(&self) -> usize {
+        if self.wrap == Wrap::Black && !(0.0..=self.size as f32).contains(&self.position) {
+            return OUTSIDE;
+        }
         // c − ⌊c⌋ rounds to 1 just below an integer: that is the last texel.
         (self.position as usize).min(self.size - 1)
     }
@@ -220,11 +295,15 @@ impl Along {
         let from_middle = self.position - 0.5;
         let low = from_middle.floor();
         let weight = from_middle - low;
+        if self.wrap == Wrap::Black {
+            let place = |i: f32| if i < 0.0 { OUTSIDE } else { i as usize };
+            return (place(low), place(low + 1.0), weight);
+        }
         // At most half a texel beyond either edge.
         let last = self.size - 1;
         let beyond = match self.wrap {
             Wrap::Repeat => (last, 0),
-            Wrap::Clamp | Wrap::Mirror => (0, last),
+            Wrap::Clamp | Wrap::Mirror | Wrap::Black => (0, last),
         };
         let first = if low < 0.0 {
             beyond.0
@@ -241,8 +320,6 @@ impl Along {
 mod tests {
     use super::*;
     use describe::{ImageSource, UvTransform};
-
-    const WHITE: [f32; 4] = [1.0; 4];
 
     fn described() -> describe::Texture {
         describe::Texture {
@@ -311,6 +388,13 @@ mod tests {
         assert_eq!(at(Wrap::Clamp, 1.0), 8.0);
         assert_eq!(at(Wrap::Mirror, 0.0), 1.0);
         assert_eq!(at(Wrap::Mirror, 1.0), 8.0);
+        // Black: halfway between the last middle and nothing, and nothing beyond.
+        assert_eq!(at(Wrap::Black, 0.0), 0.5);
+        assert_eq!(at(Wrap::Black, 1.0), 4.0);
+        assert_eq!(at(Wrap::Black, 0.375), 2.0);
+        for u in [-1e9, -2.0, -0.13, 1.13, 2.5, 1e9] {
+            assert_eq!(at(Wrap::Black, u), 0.0, "{u}");
+        }
         for i in -3i16..=3 {
             for (x, value) in row.iter().enumerate() {
                 let u = f32::from(i) + (x as f32 + 0.5) / 4.0;
@@ -325,12 +409,53 @@ mod tests {
                 assert_eq!(at(Wrap::Clamp, u), clamped, "{u}");
             }
         }
+        let sharp = grey(4, &row, |t| {
+            t.wrap[0] = Wrap::Black;
+            t.filter = TextureFilter::Nearest;
+        });
+        for (u, expected) in [(-0.01, 0.0), (0.0, 1.0), (0.99, 8.0), (1.01, 0.0)] {
+            assert_eq!(red(&sharp, u, 0.5), expected, "{u}");
+        }
         // Just below an integer, where u − ⌊u⌋ rounds to 1, and numbers that are none.
         let below = grey(4, &row, |t| t.filter = TextureFilter::Nearest);
         assert_eq!(red(&below, -1e-12, 0.5), 8.0);
         for odd in [f32::NAN, f32::INFINITY, f32::MIN, 1e30] {
             assert!(red(&below, odd, odd) >= 1.0);
         }
+    }
+
+    /// Tiles show their own square, upright, and nothing where there is none; factor and offset apply everywhere.
+    #[test]
+    fn tiles() {
+        let tile = |v: [f32; 2]| {
+            Some(Arc::new(Texels {
+                width: 1,
+                height: 2,
+                channels: 1,
+                data: TexelData::F32(v.to_vec()),
+            }))
+        };
+        let mut all = vec![None; 12];
+        (all[0], all[9], all[11]) = (tile([1.0, 2.0]), tile([3.0, 3.0]), tile([4.0, 5.0]));
+        let mut t = described();
+        t.scale = [2.0; 3];
+        t.bias = [0.5; 3];
+        let tiled = Texture::tiled(all, &t);
+        for (u, v, expected) in [
+            (0.5, 0.9, 1.0),
+            (0.5, 0.1, 2.0),
+            (9.5, 0.5, 3.0),
+            (1.2, 1.8, 4.0),
+            (1.2, 1.2, 5.0),
+            (0.5, 1.5, 0.0),
+            (-0.5, 0.5, 0.0),
+            (10.5, 0.5, 0.0),
+            (0.5, 1e20, 0.0),
+            (f32::NAN, 0.5, 0.0),
+        ] {
+            assert_eq!(red(&tiled, u, v), 2.0 * expected + 0.5, "({u}, {v})");
+        }
+        assert_eq!(tiled.mean(&|v| v)[0], 2.0 * 3.0 + 0.5);
     }
 
     #[test]
@@ -405,7 +530,7 @@ mod tests {
         t.bias = [0.0, 1.0, 0.125];
         let grey = Texture::new(Some(texels.clone()), &t);
         assert_eq!(grey.at([0.25, 0.0], &WHITE), [0.5, 0.75, 0.125, 0.5]);
-        assert_eq!(grey.mean(|v| v), [1.0, 0.5, 0.125, 0.75]);
+        assert_eq!(grey.mean(&|v| v), [1.0, 0.5, 0.125, 0.75]);
         t.channel = Some(TextureChannel::Alpha);
         let alpha = Texture::new(Some(texels), &t);
         assert_eq!(alpha.at([0.25, 0.0], &WHITE), [1.0, 0.5, 0.125, 0.5]);
@@ -434,7 +559,7 @@ mod tests {
         t.scale = [2.0; 3];
         let alpha = Texture::new(Some(texels), &t).at([0.5; 2], &color);
         assert_eq!(alpha[..3], [0.25; 3]);
-        assert_eq!(Texture::new(None, &t).mean(|v| v)[..3], [2.0; 3]);
+        assert_eq!(Texture::new(None, &t).mean(&|v| v)[..3], [2.0; 3]);
     }
 
     /// The transform scales, rotates counter-clockwise and moves, in this order.

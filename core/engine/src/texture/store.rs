@@ -6,7 +6,7 @@ use resolvent_image::{Limits, Texels};
 use resolvent_scene::{self as describe, ImageSource};
 use std::collections::HashMap;
 use std::ffi::c_void;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 /// A texture as one parameter sees it: clamped to the parameter's range. Its address is the handle that plugins hold.
@@ -30,7 +30,7 @@ impl Binding {
 
     /// Mean over the texels of the image.
     pub fn mean(&self) -> [f32; 4] {
-        self.texture.mean(|v| self.bounded(v))
+        self.texture.mean(&|v| self.bounded(v))
     }
 
     #[inline(always)]
@@ -82,29 +82,78 @@ struct State {
     textures: HashMap<String, Arc<Texture>>,
 }
 
+/// Stands for the number of a tile in the name of a file.
+const UDIM: &str = "<UDIM>";
+
+/// The files of a tiled image with their indices, column + 10 row, in order.
+fn tiles_of(pattern: &Path) -> std::result::Result<Vec<(usize, PathBuf)>, resolvent_image::Error> {
+    let unreadable = |source| resolvent_image::Error::Io {
+        file: pattern.to_owned(),
+        what: "",
+        source,
+    };
+    let name = pattern.file_name().unwrap_or_default().to_string_lossy();
+    let Some((before, after)) = name.split_once(UDIM) else {
+        let what = std::io::Error::other("<UDIM> must stand in the file's name, not in a folder's");
+        return Err(unreadable(what));
+    };
+    let folder = match pattern.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    let folder = folder.canonicalize().map_err(unreadable)?;
+    let mut tiles = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let number = name
+            .strip_prefix(before)
+            .and_then(|n| n.strip_suffix(after));
+        if let Some(number) = number.filter(|n| n.len() == 4)
+            && let Ok(number @ 1001..=9999) = number.parse::<usize>()
+        {
+            tiles.push((number - 1001, path));
+        }
+    }
+    tiles.sort();
+    if tiles.is_empty() {
+        let what = std::io::Error::new(
+            std::io::ErrorKind::NotFound,
+            "no file with a tile's number (1001 to 9999) in place of <UDIM>",
+        );
+        return Err(unreadable(what));
+    }
+    Ok(tiles)
+}
+
 impl State {
-    /// The texels of a texture's image, read if nobody has yet.
+    /// The texels of an image, read at the first time; `None` for no image.
     fn image(
         &mut self,
-        key: Key,
-        name: &str,
-        described: &describe::Texture,
+        source: &ImageSource,
         scene: &describe::Scene,
-    ) -> Result<Arc<Texels>> {
-        if let Some(index) = self.images.get(&key) {
-            return Ok(self.read[*index].texels.clone());
-        }
-        let image = read(&described.image, scene).map_err(|e| {
-            let what = format!("texture '{name}': {e}");
-            describe::Problem::new(&scene.source.file, described.place.clone(), what)
-        })?;
-        let Some(image) = image else {
-            return Err(Error::Input(format!("the texture '{name}' has no image")));
+    ) -> std::result::Result<Option<Arc<Texels>>, resolvent_image::Error> {
+        let key = match source {
+            ImageSource::File(file) => {
+                let path = scene.resolve(file);
+                Key::File(path.canonicalize().unwrap_or(path))
+            }
+            ImageSource::Memory(image) => Key::Memory(image.bytes.as_ptr().addr()),
+            ImageSource::White => return Ok(None),
         };
-        let texels = image.texels.clone();
-        self.images.insert(key, self.read.len());
-        self.read.push(image);
-        Ok(texels)
+        let index = match self.images.get(&key) {
+            Some(index) => *index,
+            None => {
+                let Some(image) = read(source, scene)? else {
+                    return Ok(None);
+                };
+                self.read.push(image);
+                let index = self.read.len() - 1;
+                self.images.insert(key, index);
+                index
+            }
+        };
+        Ok(Some(self.read[index].texels.clone()))
     }
 }
 
@@ -133,19 +182,23 @@ impl Textures {
             .textures
             .get(name)
             .ok_or_else(|| Error::Input(format!("there is no texture '{name}' in the scene")))?;
-        let key = match &described.image {
-            ImageSource::File(file) => {
-                let path = scene.resolve(file);
-                Some(Key::File(path.canonicalize().unwrap_or(path)))
+        let problem = |e: resolvent_image::Error| {
+            let what = format!("texture '{name}': {e}");
+            describe::Problem::new(&scene.source.file, described.place.clone(), what)
+        };
+        let texture = match &described.image {
+            ImageSource::File(file) if file.contains(UDIM) => {
+                let mut tiles = Vec::new();
+                for (number, path) in tiles_of(&scene.resolve(file)).map_err(problem)? {
+                    tiles.resize(tiles.len().max(number + 1), None);
+                    let file = ImageSource::File(path.to_string_lossy().into_owned());
+                    tiles[number] = state.image(&file, scene).map_err(problem)?;
+                }
+                Texture::tiled(tiles, described)
             }
-            ImageSource::Memory(image) => Some(Key::Memory(image.bytes.as_ptr().addr())),
-            ImageSource::White => None,
+            image => Texture::new(state.image(image, scene).map_err(problem)?, described),
         };
-        let texels = match key {
-            Some(key) => Some(state.image(key, name, described, scene)?),
-            None => None,
-        };
-        let texture = Arc::new(Texture::new(texels, described));
+        let texture = Arc::new(texture);
         state.textures.insert(name.to_owned(), texture.clone());
         Ok(texture)
     }

@@ -27,7 +27,7 @@ pub struct Verified {
     pub paths: u64,
     /// Sums of weights that are off by more than 1e-6.
     pub loose: u64,
-    /// Largest relative differences of contributions and of densities, and of a sum of weights from 1, rounding allowed for.
+    /// Largest differences of contributions, of densities, and of a sum of weights from 1, as shares of what was allowed there.
     pub worst: [f64; 3],
     /// The first difference beyond the tolerance.
     pub mismatch: Option<String>,
@@ -133,7 +133,7 @@ impl Bidirectional {
                 own.chosen,
             );
         }
-        verified.worst[1] = f64::max(verified.worst[1], worst - slack);
+        verified.worst[1] = f64::max(verified.worst[1], worst / (TOLERANCE + slack));
         if worst > TOLERANCE + slack {
             return Ok(Some(format!(
                 "{which}: {}",
@@ -148,7 +148,7 @@ impl Bidirectional {
         for lane in 0..lanes as usize {
             let (cached, exact) = (f64::from(value[lane]) / survival, f.lanes[lane] * scale);
             let off = (cached - exact).abs() / cached.abs().max(exact.abs()).max(f64::MIN_POSITIVE);
-            verified.worst[0] = f64::max(verified.worst[0], off - slack);
+            verified.worst[0] = f64::max(verified.worst[0], off / (TOLERANCE + slack));
             if off > TOLERANCE + slack {
                 return Ok(Some(format!(
                     "its weighted contribution in lane {lane} is {cached:e}, recomputed {exact:e}: {}",
@@ -172,7 +172,7 @@ impl Bidirectional {
         }
         let off = (sum - 1.0).abs();
         verified.loose += u64::from(off > 1e-6);
-        verified.worst[2] = f64::max(verified.worst[2], off - slack);
+        verified.worst[2] = f64::max(verified.worst[2], off / (SUM_TOLERANCE + slack));
         Ok((off > SUM_TOLERANCE + slack).then(|| {
             format!(
                 "the weights of all strategies sum to {sum}: {}",

@@ -11,7 +11,7 @@
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events of a path, −1: any number. A limit makes the picture darker than it should be |
-//! | `large_steps` | float in (0, 1] | 0.3 | share of large steps |
+//! | `large_steps` | float in (0, 1] | 0.6 | share of large steps |
 //! | `sigma` | float > 0 | 0.01 | standard deviation of small steps, of the unit interval: the geometric mean of what steps draw |
 //! | `sigma_range` | float ≥ 1 | 16 | largest over mean standard deviation, and mean over smallest |
 //! | `mean_depth` | float > 0 | 4 | mean number of scattering events beyond the first that large steps propose; thick media want more |
@@ -47,7 +47,7 @@ impl Plugin for Metropolis {
             .at_least(-1.0)
             .build(),
         Decl::float("large_steps", "share of steps that draw everything anew")
-            .default("0.3")
+            .default("0.6")
             .above(0.0)
             .at_most(1.0)
             .build(),
