@@ -38,6 +38,8 @@ pub enum Command {
     Render(Box<Render>),
     /// Convert a USD stage to a scene
     Convert(Convert),
+    /// Write a scene as a USD stage
+    Export(Export),
     /// Say what is in a VDB file, a glTF model, a scene or an EXR image
     Info(Info),
     /// Compare an image with a reference
@@ -187,6 +189,23 @@ impl Stage {
             ("--keep-going", self.keep_going),
         ])
     }
+}
+
+/// Options of `export`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Example:\n  resolvent export scene.json -o scene.usda")]
+pub struct Export {
+    /// The scene (.json)
+    pub scene: PathBuf,
+    /// The stage to write (.usda, .usdc, .usd)
+    #[arg(short, long, value_name = "STAGE.usda")]
+    pub output: PathBuf,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Any loss is an error
+    #[arg(long)]
+    pub strict: bool,
 }
 
 /// Options of `convert`.

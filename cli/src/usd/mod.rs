@@ -3,36 +3,54 @@
 mod cache;
 mod python;
 
-pub use python::Python;
+use python::Python;
 
-use crate::args::{Convert, Stage};
+use crate::args::{Convert, Export, Stage};
 use crate::console;
-use crate::failure::{Code, Failure, Outcome, failed, input};
+use crate::failure::{Code, Outcome, failed, input};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// `resolvent convert`.
-pub fn run(a: &Convert) -> Outcome {
+pub fn convert(a: &Convert) -> Outcome {
     let python = Python::find()?;
     let mut command = command(&python, &a.stage, &a.output, &a.options);
     if let Some(frames) = &a.frames {
         command.arg(format!("--frames={frames}"));
     }
-    if let Some(report) = &a.report {
-        command.arg("--report").arg(report);
+    report(&mut command, &a.report);
+    finish(command, &python, &a.stage)
+}
+
+/// `resolvent export`.
+pub fn export(a: &Export) -> Outcome {
+    let python = Python::find()?;
+    let mut command = python.command();
+    command.arg("-m").arg("resolvent_usd.export").arg(&a.scene);
+    command.arg("-o").arg(&a.output);
+    if a.strict {
+        command.arg("--strict");
     }
-    // Both streams go where ours go.
+    report(&mut command, &a.report);
+    finish(command, &python, &a.scene)
+}
+
+fn report(command: &mut Command, file: &Option<PathBuf>) {
+    if let Some(file) = file {
+        command.arg("--report").arg(file);
+    }
+}
+
+/// Runs a conversion; what it says goes where we say things.
+fn finish(mut command: Command, python: &Python, what: &Path) -> Outcome {
     let status = command.status().map_err(|e| python.broken(&e))?;
     match status.code() {
         Some(0) => Ok(Code::Done),
-        Some(2) => Err(Failure {
-            code: Code::Input,
-            message: format!("{} is not converted", a.stage.display()),
-        }),
+        Some(2) => Err(input(format!("{} is not converted", what.display()))),
         _ => Err(failed(format!(
             "the conversion of {} failed ({status})",
-            a.stage.display()
+            what.display()
         ))),
     }
 }

@@ -269,6 +269,9 @@ typedef struct resolvent_spectrum {
 /* The surface emits towards `wo`. */
 #define RESOLVENT_VERTEX_FLAGS_EMITS 4
 
+/* Of a camera whose rays are parallel: densities are per area across them, not per steradian. Since minor version 2. */
+#define RESOLVENT_VERTEX_FLAGS_PARALLEL 8
+
 /* No light, no medium. */
 #define RESOLVENT_NONE UINT32_MAX
 
@@ -760,10 +763,11 @@ typedef struct resolvent_camera_ray {
   /* The interior media the camera is in: private to the host. */
   uint64_t inside;
   /* Density of the direction (sr⁻¹) under film positions of density 1 per pixel area, whatever the reconstruction filter:
-   * what weights between techniques are made of. */
+   * what weights between techniques are made of. Per area across the ray, and not per steradian, if `flags` have
+   * `RESOLVENT_VERTEX_FLAGS_PARALLEL`. */
   float density;
-  /* Zero. */
-  uint32_t reserved;
+  /* Bits of `RESOLVENT_VERTEX_FLAGS_*`: `PARALLEL`. */
+  uint32_t flags;
 } resolvent_camera_ray;
 
 /* A ray that leaves a light: the start of a light walk. The vertex it leaves from is filled beside it.
@@ -789,7 +793,8 @@ typedef struct resolvent_light_ray {
 
 /* A point on the lens as a vertex of the scene sees it. */
 typedef struct resolvent_sensor_sample {
-  /* What to connect to. `density` is that of `resolvent_camera_ray`: importance per steradian at the lens, 1 per pixel area. */
+  /* What to connect to. `density` is that of `resolvent_camera_ray`, as are the `PARALLEL` bit and what it means: importance per
+   * steradian at the lens, 1 per pixel area. */
   struct resolvent_light_sample target;
   /* Position on the film, pixels. */
   float film[2];
@@ -880,6 +885,12 @@ typedef struct resolvent_scene_table {
                                        const struct resolvent_vertex *light,
                                        const struct resolvent_vertex *to,
                                        resolvent_float2 *out);
+  /* Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
+   * lights that no ray can meet. Since minor version 2: there if `size` reaches it. */
+  resolvent_status (*radiance)(const void *ctx,
+                               const struct resolvent_vertex *light,
+                               const struct resolvent_vertex *to,
+                               resolvent_spectrum *out);
 } resolvent_scene_table;
 
 /* Features of a pixel sample beyond its radiance; filled if `resolvent_tile.features` asks for them. */

@@ -563,7 +563,7 @@ pub struct SceneTable {
         out: *mut [f32; 2],
     ) -> Status,
     /// Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
-    /// lights that no ray can meet.
+    /// lights that no ray can meet. Since minor version 2: there if `size` reaches it.
     pub radiance: unsafe extern "C" fn(
         ctx: *const c_void,
         light: *const Vertex,

@@ -33,7 +33,7 @@ pub mod vertex_flags {
     pub const DELTA: u32 = 2;
     /// The surface emits towards `wo`.
     pub const EMITS: u32 = 4;
-    /// Of a camera whose rays are parallel: densities are per area across them, not per steradian.
+    /// Of a camera whose rays are parallel: densities are per area across them, not per steradian. Since minor version 2.
     pub const PARALLEL: u32 = 8;
 }
 

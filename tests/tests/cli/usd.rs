@@ -194,6 +194,26 @@ fn converted_to_scenes() {
     assert_eq!(out.status.code(), Some(2), "{}", said(&out));
 }
 
+/// A scene that goes to USD and comes back has the same parts.
+#[test]
+fn exported_and_back() {
+    let folder = folder("usd_export");
+    std::fs::write(folder.join("shot.usda"), stage("(1, 0, 0)")).unwrap();
+    for args in [
+        ["convert", "shot.usda", "-o", "there.json"],
+        ["export", "there.json", "-o", "stage.usda"],
+        ["convert", "stage.usda", "-o", "back.json"],
+    ] {
+        let out = run(&folder, python(), &args);
+        assert!(out.status.success(), "{}", said(&out));
+    }
+    let [there, back] = ["there.json", "back.json"]
+        .map(|f| resolvent_scene::Scene::read(folder.join(f)).unwrap_or_else(|e| panic!("{e}")));
+    assert_eq!(back.shapes.len(), there.shapes.len());
+    assert_eq!(back.lights.len(), there.lights.len());
+    assert_eq!(back.camera.to_world(), there.camera.to_world());
+}
+
 #[test]
 fn what_cannot_be_converted_is_wrong_input() {
     let folder = folder("usd_errors");

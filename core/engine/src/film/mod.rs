@@ -200,6 +200,14 @@ impl Film {
         self.tiles[tile].coverage()
     }
 
+    /// Samples that every pixel has.
+    pub fn least_samples(&self) -> u32 {
+        (0..self.tiles.len())
+            .map(|i| self.halves().map(|h| h.tiles[i].samples()).sum())
+            .min()
+            .unwrap_or(0)
+    }
+
     /// True if walks from lights have left light.
     pub fn has_splats(&self) -> bool {
         self.halves().any(|h| h.splats.is_some())

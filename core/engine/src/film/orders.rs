@@ -204,16 +204,18 @@ mod tests {
     fn forgotten_light_is_noticed() {
         let mut layers = Layers::new(2, 1);
         let (one, half) = (Spectrum::ONE, Spectrum::splat(0.5));
-        layers.add(0, one, &[half, half]).unwrap();
+        layers.add(0, one, &[half, half], 1.0).unwrap();
         for wrong in [
             [half, Spectrum::ZERO],
             [one, half],
             [Spectrum::splat(f32::NAN), one],
         ] {
-            layers.clone().add(0, one, &wrong).unwrap_err();
+            layers.clone().add(0, one, &wrong, 1.0).unwrap_err();
         }
         // Light that cancels leaves the rounding of what it was.
         let dust = Spectrum::splat(1e-5);
-        layers.add(0, dust, &[one, one * -1.0]).unwrap();
+        layers.add(0, dust, &[one, one * -1.0], 1.0).unwrap();
+        // Exposure multiplies layers as it has multiplied the picture.
+        layers.add(0, one, &[one, one], 0.5).unwrap();
     }
 }

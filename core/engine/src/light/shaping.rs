@@ -2,7 +2,7 @@
 
 use resolvent_api::Spectrum;
 use resolvent_api::math::{Frame, Vec3};
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::PI;
 
 /// A factor on the radiance of an emitting shape by the angle θ between the direction of emission and an axis: a cone with a
 /// soft edge and a power of the cosine, as UsdLux's `ShapingAPI` defines them (OpenUSD 24.11),
@@ -102,16 +102,6 @@ impl Shaping {
             sum += self.factor(along) * (ring * share);
         }
         sum
-    }
-
-    /// Largest angle from the axis at which there is light.
-    pub fn reach(&self) -> f32 {
-        self.cutoff.min(PI)
-    }
-
-    /// True if it narrows what a surface sends out anyway.
-    pub fn narrows(&self) -> bool {
-        self.cutoff < FRAC_PI_2
     }
 }
 

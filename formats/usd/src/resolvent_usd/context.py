@@ -35,7 +35,6 @@ class Options:
     curve_sides: int = 6
     """Sides of the tubes that curves become."""
     keep_going: bool = False
-    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,8 @@ class Look:
     """Keys of the scene's shape: material, emission, emission_texture, two_sided, interior, priority."""
     uv: str | None = None
     """The primvar (without "primvars:") with the texture coordinates of the material's textures."""
+    colors: bool = False
+    """True if textures read the corners' colours: displayColor and displayOpacity."""
 
 
 class Context:

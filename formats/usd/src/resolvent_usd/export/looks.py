@@ -133,9 +133,11 @@ class Looks:
         t = self.target.scene["textures"][name]
         image = UsdShade.Shader.Define(self.target.stage, material.GetPath().AppendChild(f"{use}_texture"))
         image.CreateIdAttr("UsdUVTexture")
+        if t.get("vertex_color"):
+            self.target.report.skipped(f"/textures/{name}", "vertex_color", "colours at corners are not written", "the mesh is without them")
         if "file" in t:
             image.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self.target.asset(t["file"]))
-        else:
+        elif "data" in t:
             self.target.report.skipped(f"/textures/{name}", "data", "images inside scenes are not written", "the texture is black")
         space = {"srgb": "sRGB", "raw": "raw", "linear": "raw"}.get(t.get("color_space", "auto"), "auto")
         image.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set(space)
