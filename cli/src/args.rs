@@ -15,6 +15,7 @@ Examples:
   resolvent render cloud.vdb -o cloud.png          a VDB file, with camera and light chosen for it
   resolvent render model.glb -o model.png          a glTF model, with its own camera and lights if it has some
   resolvent render scene.json -o out.exr -o out.png --spp 256
+  resolvent render shot.usd -o shot.exr --frame 12 a USD stage; `convert` writes its scene
   resolvent info cloud.vdb                         its grids, bounds and optical thickness
   resolvent compare out.exr reference.exr          is the difference more than noise?
   resolvent plugin list                            media, phase functions, materials, integrators
@@ -33,8 +34,12 @@ pub struct Args {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a scene, or a VDB file or glTF model as it is
+    /// Render a scene, or a VDB file, glTF model or USD stage as it is
     Render(Box<Render>),
+    /// Convert a USD stage to a scene
+    Convert(Convert),
+    /// Write a scene as a USD stage
+    Export(Export),
     /// Say what is in a VDB file, a glTF model, a scene or an EXR image
     Info(Info),
     /// Compare an image with a reference
@@ -65,7 +70,7 @@ Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctr
 #[derive(Debug, ClapArgs)]
 #[command(after_help = RENDER_EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
-    /// A scene (.json), an OpenVDB file (.vdb) or a glTF model (.gltf, .glb)
+    /// A scene (.json), an OpenVDB file (.vdb), a glTF model (.gltf, .glb) or a USD stage (.usd, .usda, .usdc, .usdz)
     pub input: PathBuf,
     /// Picture to write, .exr or .png; may be given several times [default: the input's name with .exr, in the current
     /// folder]
@@ -122,6 +127,10 @@ pub struct Render {
     #[command(flatten)]
     pub guesses: Guesses,
 
+    /// How to convert, for USD stages
+    #[command(flatten)]
+    pub stage: Stage,
+
     /// Where to look for plugins first
     #[command(flatten)]
     pub plugins: PluginPath,
@@ -134,6 +143,91 @@ pub struct Render {
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// Options of USD stages.
+#[derive(Debug, Default, ClapArgs)]
+#[command(next_help_heading = "USD stages")]
+pub struct Stage {
+    /// Time code [default: the stage's start]
+    #[arg(long, value_name = "T", value_parser = finite, allow_hyphen_values = true)]
+    pub frame: Option<f64>,
+    /// Select a variant; may be given several times
+    #[arg(long, value_name = "/PRIM{SET=SELECTION}")]
+    pub variant: Vec<String>,
+    /// Purposes that are drawn [default: those of the render settings, else default,render]
+    #[arg(long, value_name = "LIST")]
+    pub purpose: Option<String>,
+    /// The camera [default: that of the render settings, else the first]
+    #[arg(long, value_name = "/PRIM")]
+    pub stage_camera: Option<String>,
+    /// The RenderSettings prim [default: the stage's own]
+    #[arg(long, value_name = "/PRIM")]
+    pub render_settings: Option<String>,
+    /// Level of subdivision surfaces [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=6))]
+    pub subdivision: Option<u8>,
+    /// Any loss is an error
+    #[arg(long)]
+    pub strict: bool,
+    /// Leave out prims with errors and convert the rest
+    #[arg(long)]
+    pub keep_going: bool,
+}
+
+impl Stage {
+    /// The first option given, for inputs that take none.
+    pub fn given(&self) -> Option<&'static str> {
+        first(&[
+            ("--frame", self.frame.is_some()),
+            ("--variant", !self.variant.is_empty()),
+            ("--purpose", self.purpose.is_some()),
+            ("--stage-camera", self.stage_camera.is_some()),
+            ("--render-settings", self.render_settings.is_some()),
+            ("--subdivision", self.subdivision.is_some()),
+            ("--strict", self.strict),
+            ("--keep-going", self.keep_going),
+        ])
+    }
+}
+
+/// Options of `export`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Example:\n  resolvent export scene.json -o scene.usda")]
+pub struct Export {
+    /// The scene (.json)
+    pub scene: PathBuf,
+    /// The stage to write (.usda, .usdc, .usd)
+    #[arg(short, long, value_name = "STAGE.usda")]
+    pub output: PathBuf,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Any loss is an error
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Options of `convert`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent convert shot.usd -o shot.json --frame 12\n  resolvent convert shot.usd -o shot.####.json --frames 1-100:2 --report losses.json\n\nMeshes and tables of instances go into a folder beside the scene. What is not converted in full is said, and listed by --report."
+)]
+pub struct Convert {
+    /// The stage (.usd, .usda, .usdc, .usdz)
+    pub stage: PathBuf,
+    /// The scene to write
+    #[arg(short, long, value_name = "SCENE.json")]
+    pub output: PathBuf,
+    /// A sequence, one scene for each frame: #### in the output is the number
+    #[arg(long, value_name = "A-B[:STEP]", conflicts_with = "frame")]
+    pub frames: Option<String>,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// How to convert
+    #[command(flatten)]
+    pub options: Stage,
 }
 
 /// How PNG files are made.
@@ -352,7 +446,7 @@ pub struct Merge {
 /// Options of `plugin`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so"
+    after_help = "Examples:\n  resolvent plugin list\n  resolvent plugin info hg\n  resolvent plugin info target/release/libmine.so\n  resolvent plugin new soft-ball --kind medium --lang rust\n  resolvent plugin check target/release/libmine.so --isolate"
 )]
 pub struct Plugin {
     /// What to do
@@ -383,6 +477,76 @@ pub enum PluginAction {
         #[command(flatten)]
         plugins: PluginPath,
     },
+    /// Write a complete plugin to start from: source, build file, test, scene
+    New(New),
+    /// Check that a plugin keeps the promises of its kind: statistics, edge cases, threads, memory
+    Check(Check),
+}
+
+/// Options of `plugin new`.
+#[derive(Debug, ClapArgs)]
+pub struct New {
+    /// The plugin's name, as in scenes
+    pub name: String,
+    /// What it is
+    #[arg(long, value_enum)]
+    pub kind: NewKind,
+    /// What it is written in
+    #[arg(long, value_enum, default_value_t = Language::Rust)]
+    pub lang: Language,
+    /// The folder to make [default: the name]
+    #[arg(long, value_name = "DIR")]
+    pub to: Option<PathBuf>,
+    /// Folder of resolvent-api, for Rust [default: that of the sources beside the program, or the published one]
+    #[arg(long, value_name = "DIR")]
+    pub api: Option<PathBuf>,
+}
+
+/// Kinds of plugins.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum NewKind {
+    /// What fills space
+    Medium,
+    /// How a surface scatters
+    Bsdf,
+    /// How a medium scatters
+    Phase,
+    /// How pictures are computed
+    Integrator,
+}
+
+/// Languages that there are templates in.
+#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
+pub enum Language {
+    /// Against the crate resolvent-api
+    Rust,
+    /// Against resolvent.h
+    C,
+}
+
+/// Options of `plugin check`.
+#[derive(Debug, ClapArgs)]
+pub struct Check {
+    /// A plugin's name, or the path of its library
+    pub plugin: String,
+    /// Parameters to check it with, as JSON; those that are not given are varied over their ranges
+    #[arg(long, value_name = "JSON")]
+    pub params: Option<String>,
+    /// Check in a process of its own, so that a crash or a hang is reported like any other fault
+    #[arg(long)]
+    pub isolate: bool,
+    /// Seconds without progress that count as a hang, with --isolate
+    #[arg(long, value_name = "S", default_value_t = 120)]
+    pub patience: u64,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Say every stage: for the process that --isolate starts
+    #[arg(long, hide = true)]
+    pub stages: bool,
+    /// Where to look first
+    #[command(flatten)]
+    pub plugins: PluginPath,
 }
 
 /// Options of `schema`.

@@ -6,6 +6,7 @@
 mod args;
 #[cfg(feature = "bench")]
 mod bench;
+mod check;
 mod checkpoint;
 mod compare;
 mod console;
@@ -22,6 +23,8 @@ mod progress;
 mod render;
 mod stats;
 mod system;
+mod template;
+mod usd;
 mod values;
 mod volume;
 
@@ -43,6 +46,8 @@ fn main() -> ExitCode {
     let args = args::Args::parse();
     let outcome = std::panic::catch_unwind(|| match args.command {
         args::Command::Render(a) => render::run(&a),
+        args::Command::Convert(a) => usd::convert(&a),
+        args::Command::Export(a) => usd::export(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
         args::Command::Merge(a) => merge::run(&a),

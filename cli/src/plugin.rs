@@ -2,8 +2,7 @@
 
 use crate::args::{Plugin as Args, PluginAction, Schema};
 use crate::failure::{Code, Outcome, input};
-use resolvent_api::PluginKind;
-use resolvent_engine::plugin::{Plugin, Registry};
+use resolvent_engine::plugin::{Found, Plugin, Registry};
 use resolvent_scene::{ParamDecl, ParamKind, PluginBlock, Value, nearest};
 use serde_json::{Value as Json, json};
 use std::path::Path;
@@ -18,6 +17,8 @@ pub fn run(a: &Args) -> Outcome {
             json,
             plugins,
         } => info(&plugins.registry()?, name, *json),
+        PluginAction::New(a) => crate::template::run(a),
+        PluginAction::Check(a) => crate::check::run(a),
     }
 }
 
@@ -26,40 +27,44 @@ pub fn schema(a: &Schema) -> Outcome {
     let registry = a.plugins.registry()?;
     let decls: Vec<_> = available(&registry)
         .into_iter()
-        .filter_map(|(_, _, plugin)| Some(plugin.ok()?.decl.clone()))
+        .filter_map(|(_, plugin)| Some(plugin.ok()?.decl.clone()))
         .collect();
     println!("{:#}", resolvent_scene::schema(&decls));
     Ok(Code::Done)
 }
 
-type Found = (PluginKind, String, Result<Arc<Plugin>, String>);
+type Loaded = (Found, Result<Arc<Plugin>, String>);
 
 /// All plugins in the search path, loaded; those that cannot be loaded are told of.
-fn available(registry: &Registry) -> Vec<Found> {
+fn available(registry: &Registry) -> Vec<Loaded> {
     registry
-        .available()
+        .found()
         .into_iter()
-        .map(|(kind, name, path)| {
-            let plugin = registry.load(kind, &path).map_err(|e| e.to_string());
+        .map(|found| {
+            let plugin = registry.load(found.kind, &found.path);
+            let plugin = plugin.map_err(|e| e.to_string());
             if let Err(why) = &plugin {
                 crate::console::warning(why);
             }
-            (kind, name, plugin)
+            (found, plugin)
         })
         .collect()
 }
 
+/// Reads the headers alone: no function of a plugin is called.
 fn list(registry: &Registry, json: bool) -> Outcome {
     let all = available(registry);
     if json {
         let plugins: Vec<Json> = all
             .iter()
-            .map(|(kind, name, plugin)| match plugin {
+            .map(|(f, plugin)| match plugin {
                 Ok(p) => json!({
-                    "kind": kind.name(), "name": name, "version": p.decl.version,
-                    "summary": p.decl.summary, "path": p.path,
+                    "kind": f.kind.name(), "name": f.name, "version": p.decl.version,
+                    "summary": p.decl.summary, "path": p.path, "hides": f.hides,
                 }),
-                Err(why) => json!({"kind": kind.name(), "name": name, "error": why}),
+                Err(why) => json!({
+                    "kind": f.kind.name(), "name": f.name, "error": why, "path": f.path, "hides": f.hides,
+                }),
             })
             .collect();
         println!(
@@ -68,13 +73,22 @@ fn list(registry: &Registry, json: bool) -> Outcome {
         );
         return Ok(Code::Done);
     }
-    for (kind, name, plugin) in &all {
+    for (f, plugin) in &all {
         if let Ok(p) = plugin {
             println!(
-                "{:<11} {name:<17} {:<8} {}",
-                kind.name(),
+                "{:<11} {:<17} {:<8} {}",
+                f.kind.name(),
+                f.name,
                 p.decl.version,
                 p.decl.summary
+            );
+        }
+        for hidden in &f.hides {
+            println!(
+                "{:<38} not used: {}, behind {}",
+                "",
+                hidden.display(),
+                f.path.display()
             );
         }
     }

@@ -3,9 +3,24 @@
 //! Rust authors never meet this file: they implement the safe traits and write one `export_plugin!` line. C authors
 //! need only what is here.
 //!
-//! Rules: every table starts with its `size`, so later minor versions can append and the other side knows what is there;
-//! a change of anything else is a new major version, which is refused with both versions named. The side that
-//! allocates frees. Only plain data crosses, by pointer. Every function may be called from any thread at any time after
+//! # Versions
+//!
+//! The ABI has a version of its own, apart from the crate's: [`ABI_MAJOR`] and [`ABI_MINOR`], written into every plugin's header.
+//!
+//! - A **minor** version appends: functions at the end of a table, bits of flags, numbers of kinds, meaning for what was reserved and
+//!   zero. A plugin of an older minor version works as before; one of a newer works in an older host as long as it looks at a
+//!   table's `size` before it uses what was appended. What came with which minor version says so ("Since minor version 1").
+//! - A **major** version changes anything else. Host and plugin must have the same; otherwise the plugin is refused with a sentence
+//!   that names both versions and the side to update.
+//!
+//! A plugin that was built once, by whatever compiler, goes on working with every later host of its major version. The
+//! crate's version follows Cargo's rules for Rust authors: a crate that breaks their sources may keep the ABI, and then their old
+//! libraries keep working. `CHANGELOG.md` lists both. C authors find the same in `include/resolvent.h`.
+//!
+//! # Rules
+//!
+//! Every table starts with its `size`, so later minor versions can append and the other side knows what is there.
+//! The side that allocates frees. Only plain data crosses, by pointer. Every function may be called from any thread at any time after
 //! `create` returned and before `destroy`. Libraries are never unloaded.
 
 use crate::closure::Closure;
@@ -286,6 +301,14 @@ pub struct HostTable {
         uv: *const [f32; 2],
         out: *mut [f32; 4],
     ),
+    /// The same at a point of a surface: textures may depend on more of it than its texture coordinates (the colours of its mesh),
+    /// which [`HostTable::texture`] takes for white. Since minor version 2: there if `size` reaches it.
+    pub texture_at: unsafe extern "C" fn(
+        ctx: *mut c_void,
+        texture: *const c_void,
+        at: *const SurfacePoint,
+        out: *mut [f32; 4],
+    ),
 }
 
 // SAFETY: the host's functions may be called from any thread.
@@ -305,7 +328,8 @@ pub struct ScatterTable {
     pub size: u32,
     /// Bytes of the closure that are in use.
     pub data_size: u32,
-    /// [`crate::Scatter::eval`].
+    /// Value and densities between two unit directions that point away from the vertex, see [`crate::Scatter::eval`]. `mode` is a
+    /// [`Mode`](crate::Mode) as its number.
     pub eval: unsafe extern "C" fn(
         data: *const c_void,
         wo: *const Float3,
@@ -313,7 +337,7 @@ pub struct ScatterTable {
         mode: u32,
         out: *mut ScatterEval,
     ) -> Status,
-    /// [`crate::Scatter::sample`]; [`Status::NONE`] if absorbed.
+    /// Chooses `wi` for `wo`, see [`crate::Scatter::sample`]; [`Status::NONE`] if the light is absorbed.
     pub sample: unsafe extern "C" fn(
         data: *const c_void,
         wo: *const Float3,
@@ -321,9 +345,9 @@ pub struct ScatterTable {
         mode: u32,
         out: *mut ScatterSample,
     ) -> Status,
-    /// [`crate::Scatter::lobes`].
+    /// Bits of [`lobes`](crate::operator::lobes), see [`crate::Scatter::lobes`].
     pub lobes: unsafe extern "C" fn(data: *const c_void) -> u32,
-    /// [`crate::Scatter::eta`]; null: 1.
+    /// Index of refraction below the surface over that above, see [`crate::Scatter::eta`]; null: 1.
     pub eta: Option<unsafe extern "C" fn(data: *const c_void) -> f32>,
 }
 
@@ -338,29 +362,29 @@ pub struct MediumTable {
     pub create: Create,
     /// Ends it.
     pub destroy: Destroy,
-    /// [`crate::Medium::info`].
+    /// Bounds and facts, see [`crate::Medium::info`].
     pub info: unsafe extern "C" fn(instance: *const c_void, out: *mut MediumInfo) -> Status,
-    /// [`crate::Medium::sample`].
+    /// Free flight: a collision or survival, with densities; see [`crate::Medium::sample`].
     pub sample: unsafe extern "C" fn(
         instance: *const c_void,
         s: *const Segment,
         u: *const FlightDraws,
         out: *mut Flight,
     ) -> Status,
-    /// [`crate::Medium::transmit`].
+    /// Unbiased transmittance `value/ratio` of a connection; see [`crate::Medium::transmit`].
     pub transmit: unsafe extern "C" fn(
         instance: *const c_void,
         s: *const Segment,
         u: *const FlightDraws,
         out: *mut Flight,
     ) -> Status,
-    /// [`crate::Medium::depth`].
+    /// Approximate optical depth, deterministic and cheap; see [`crate::Medium::depth`].
     pub depth: unsafe extern "C" fn(
         instance: *const c_void,
         s: *const Segment,
         out: *mut Spectrum,
     ) -> Status,
-    /// [`crate::Medium::coefficients`].
+    /// Exact coefficients at a point in the world, see [`crate::Medium::coefficients`].
     pub coefficients: unsafe extern "C" fn(
         instance: *const c_void,
         p: *const Float3,
@@ -379,7 +403,7 @@ pub struct PhaseTable {
     pub create: Create,
     /// Ends it.
     pub destroy: Destroy,
-    /// [`crate::PhaseFunction::closure`]. The closure may point into the instance: no function of it is called after `destroy`.
+    /// Resolves the phase function at a point, see [`crate::PhaseFunction::closure`]. The closure may point into the instance: no function of it is called after `destroy`.
     pub closure: unsafe extern "C" fn(
         instance: *const c_void,
         at: *const MediumPoint,
@@ -398,15 +422,15 @@ pub struct BsdfTable {
     pub create: Create,
     /// Ends it.
     pub destroy: Destroy,
-    /// [`crate::Bsdf::traits`].
+    /// Bits of [`bsdf_traits`](crate::surface::bsdf_traits), see [`crate::Bsdf::traits`].
     pub traits: unsafe extern "C" fn(instance: *const c_void) -> u32,
-    /// [`crate::Bsdf::closure`].
+    /// Resolves the BSDF at a point, see [`crate::Bsdf::closure`].
     pub closure: unsafe extern "C" fn(
         instance: *const c_void,
         at: *const SurfacePoint,
         out: *mut Closure,
     ) -> Status,
-    /// [`crate::Bsdf::ior`]; null: 1.
+    /// Index of refraction inside, see [`crate::Bsdf::ior`]; null: 1.
     pub ior: Option<unsafe extern "C" fn(instance: *const c_void) -> f32>,
 }
 
@@ -538,6 +562,14 @@ pub struct SceneTable {
         to: *const Vertex,
         out: *mut [f32; 2],
     ) -> Status,
+    /// Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
+    /// lights that no ray can meet. Since minor version 2: there if `size` reaches it.
+    pub radiance: unsafe extern "C" fn(
+        ctx: *const c_void,
+        light: *const Vertex,
+        to: *const Vertex,
+        out: *mut Spectrum,
+    ) -> Status,
 }
 
 /// Features of a pixel sample beyond its radiance; filled if [`Tile::features`] asks for them.
@@ -635,7 +667,7 @@ pub struct IntegratorTable {
     pub create: Create,
     /// Ends it.
     pub destroy: Destroy,
-    /// [`crate::Integrator::render`].
+    /// Renders a piece of work: every sample of every pixel of the tile, see [`crate::Integrator::render`].
     pub render: unsafe extern "C" fn(
         instance: *const c_void,
         scene: *const SceneTable,

@@ -441,6 +441,149 @@ pub const fn header<T: Plugin>(
 }
 
 /// Exports a type as this library's plugin: `export_plugin!(medium, Fog);` with `medium`, `phase`, `bsdf` or `integrator`.
+///
+/// The type implements [`Plugin`] and the trait of its kind:
+///
+/// ```
+/// use resolvent_api::phase::MediumPoint;
+/// use resolvent_api::*;
+///
+/// /// Scatters evenly into all directions.
+/// #[derive(Clone, Copy)]
+/// struct Even;
+///
+/// impl Plugin for Even {
+///     const NAME: &'static str = "even";
+///     const SUMMARY: &'static str = "Scatters evenly.";
+///     const PARAMS: &'static [ParamDecl] = &[];
+///     fn create(_: &Params<'_>) -> Result<Self, Error> {
+///         Ok(Self)
+///     }
+/// }
+///
+/// impl PhaseFunction for Even {
+///     type Closure<'a> = Self;
+///     fn closure(&self, _: &MediumPoint) -> Self {
+///         *self
+///     }
+/// }
+///
+/// impl Scatter for Even {
+///     fn eval(&self, _: Vec3, _: Vec3, _: Mode) -> ScatterEval {
+///         let p = 1.0 / (4.0 * std::f32::consts::PI);
+///         ScatterEval { f: Spectrum::splat(p), forward: p, reverse: p }
+///     }
+///     fn sample(&self, _: Vec3, u: ScatterDraws, _: Mode) -> Option<ScatterSample> {
+///         let p = 1.0 / (4.0 * std::f32::consts::PI);
+///         Some(ScatterSample {
+///             weight: Spectrum::ONE,
+///             wi: math::warp::sphere(u.dir).into(),
+///             eta: 1.0,
+///             forward: p,
+///             reverse: p,
+///             ..ScatterSample::default()
+///         })
+///     }
+///     fn lobes(&self) -> u32 {
+///         operator::lobes::SMOOTH
+///     }
+/// }
+///
+/// export_plugin!(phase, Even);
+/// ```
+///
+/// # What does not compile
+///
+/// A type that says nothing about itself:
+///
+/// ```compile_fail,E0277
+/// struct Silent;
+/// resolvent_api::export_plugin!(phase, Silent);
+/// ```
+///
+/// A plugin exported as another kind than it is:
+///
+/// ```compile_fail,E0277
+/// # use resolvent_api::*;
+/// struct Fog;
+/// impl Plugin for Fog {
+///     const NAME: &'static str = "fog";
+///     const SUMMARY: &'static str = "A fog.";
+///     const PARAMS: &'static [ParamDecl] = &[];
+///     fn create(_: &Params<'_>) -> Result<Self, Error> {
+///         Ok(Self)
+///     }
+/// }
+/// // It implements no `Medium`.
+/// export_plugin!(medium, Fog);
+/// ```
+///
+/// A kind that there is not:
+///
+/// ```compile_fail
+/// struct Lamp;
+/// resolvent_api::export_plugin!(light, Lamp);
+/// ```
+///
+/// State that threads cannot share, which the host's would:
+///
+/// ```compile_fail,E0277
+/// # use resolvent_api::*;
+/// struct Counting(std::cell::Cell<u32>);
+/// impl Plugin for Counting {
+///     const NAME: &'static str = "counting";
+///     const SUMMARY: &'static str = "Counts.";
+///     const PARAMS: &'static [ParamDecl] = &[];
+///     fn create(_: &Params<'_>) -> Result<Self, Error> {
+///         Ok(Self(Default::default()))
+///     }
+/// }
+/// ```
+///
+/// A closure that holds what must be dropped: the host copies closures byte by byte.
+///
+/// ```compile_fail,E0277
+/// # use resolvent_api::*;
+/// struct Heavy(Vec<f32>);
+/// impl Scatter for Heavy {
+///     fn eval(&self, _: Vec3, _: Vec3, _: Mode) -> ScatterEval {
+///         ScatterEval::default()
+///     }
+///     fn sample(&self, _: Vec3, _: ScatterDraws, _: Mode) -> Option<ScatterSample> {
+///         None
+///     }
+///     fn lobes(&self) -> u32 {
+///         0
+///     }
+/// }
+/// struct Paint;
+/// impl Bsdf for Paint {
+///     type Closure = Heavy;
+///     fn traits(&self) -> u32 {
+///         0
+///     }
+///     fn closure(&self, _: &SurfacePoint) -> Heavy {
+///         Heavy(vec![])
+///     }
+/// }
+/// ```
+///
+/// A closure that is larger than what a vertex has room for:
+///
+/// ```compile_fail,E0080
+/// # use resolvent_api::*;
+/// unsafe {
+///     let mut room = Closure::EMPTY;
+///     Closure::store(&mut room, std::ptr::null(), [0u64; closure::CLOSURE_BYTES / 8 + 1]);
+/// }
+/// ```
+///
+/// A default that is no text of JSON:
+///
+/// ```compile_fail,E0308
+/// # use resolvent_api::*;
+/// const G: ParamDecl = Decl::float("g", "mean cosine").default(0.5).build();
+/// ```
 #[macro_export]
 macro_rules! export_plugin {
     (medium, $t:ty) => {

@@ -201,6 +201,15 @@ impl<'a> SceneView<'a> {
         Ok(out)
     }
 
+    /// Radiance that `light`, a vertex on an emitting surface, sends towards `to`.
+    #[inline(always)]
+    pub fn radiance(&self, light: &Vertex, to: &Vertex) -> Outcome<Spectrum> {
+        let mut out = Spectrum::ZERO;
+        // SAFETY: as above.
+        found(unsafe { (self.table.radiance)(self.table.ctx, light, to, &mut out) })?;
+        Ok(out)
+    }
+
     /// Approximate transmittance towards a light, visibility not tested.
     #[inline(always)]
     pub fn approximate(&self, from: &Vertex, to: &LightSample) -> Outcome<Spectrum> {

@@ -242,6 +242,7 @@ pub struct Flight {
 
 impl Flight {
     /// A flight through nothing, up to `t`.
+    #[inline(always)]
     pub fn vacuum(t: f32) -> Self {
         Self {
             value: Spectrum::ONE,

@@ -304,6 +304,7 @@ pub fn rho(edge: &Edge) -> Spectrum {
 }
 
 /// An edge that nothing hinders.
+#[inline(always)]
 pub fn clear(length: f32) -> Edge {
     let f = Flight::vacuum(length);
     Edge {

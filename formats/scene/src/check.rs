@@ -98,6 +98,15 @@ impl<'d> Checker<'d> {
             Kind::Vec3 => self.numbers(node, 3, "a list of three numbers", COORDINATE),
             Kind::Vec3s => self.tuples(node, 3, "a list of three numbers"),
             Kind::Pairs => self.tuples(node, 2, "a list of two numbers"),
+            Kind::Fours => self.tuples(node, 4, "a list of four numbers"),
+            Kind::Colors => {
+                let items = self.list(node, "a list of colours", None);
+                for item in items.unwrap_or_default() {
+                    let rgba = matches!(&item.data, Data::List(n) if n.len() == 4);
+                    let what = "a list of three numbers (RGB) or four (RGBA)";
+                    self.numbers(item, if rgba { 4 } else { 3 }, what, POWER);
+                }
+            }
             Kind::Triangles => {
                 for item in self
                     .list(node, "a list of triangles", None)

@@ -84,6 +84,10 @@ impl Builder<'_> {
             Kind::Vec3 => numbers(3, COORDINATE),
             Kind::Vec3s => json!({"type": "array", "items": numbers(3, COORDINATE)}),
             Kind::Pairs => json!({"type": "array", "items": numbers(2, COORDINATE)}),
+            Kind::Fours => json!({"type": "array", "items": numbers(4, COORDINATE)}),
+            Kind::Colors => json!({
+                "type": "array", "items": {"anyOf": [numbers(3, POWER), numbers(4, POWER)]},
+            }),
             Kind::Triangles => {
                 let triangle = self.kind(&Kind::Integers(3, 0, u64::from(u32::MAX)));
                 json!({"type": "array", "items": triangle})

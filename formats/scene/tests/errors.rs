@@ -129,22 +129,22 @@ fn keys_and_names() {
     expect(
         "{\"prototype\": \"stone\"}",
         "{\"prototype\": \"stoone\"}",
-        r#"full.json:57:19: $.instances[0].prototype: no prototype is named "stoone"; did you mean "stone"?"#,
+        r#"full.json:58:19: $.instances[0].prototype: no prototype is named "stoone"; did you mean "stone"?"#,
     );
     expect(
         "{\"prototype\": \"stone\"}",
         "{\"prototype\": \"stone\", \"transfrom\": []}",
-        r#"full.json:57:28: $.instances[0].transfrom: instance has no key "transfrom"; did you mean "transform"?"#,
+        r#"full.json:58:28: $.instances[0].transfrom: instance has no key "transfrom"; did you mean "transform"?"#,
     );
     expect(
         "[5, 0, 0]}], \"material\": \"floor\"}",
         "[5, 0, 0]}], \"material\": \"foor\"}",
-        r#"full.json:58:104: $.instances[1].material: no material is named "foor"; did you mean "floor"?"#,
+        r#"full.json:59:104: $.instances[1].material: no material is named "foor"; did you mean "floor"?"#,
     );
     expect(
         "\"file\": \"stone.ply\", \"material\": \"floor\"",
         "\"file\": \"stone.ply\", \"material\": \"flor\"",
-        r#"full.json:52:56: $.prototypes.stone[0].material: no material is named "flor"; did you mean "floor"?"#,
+        r#"full.json:53:56: $.prototypes.stone[0].material: no material is named "flor"; did you mean "floor"?"#,
     );
     expect(
         "\"spp\": 128",
@@ -248,12 +248,12 @@ fn numbers_and_shapes() {
     expect(
         "\"scale\": [1, -2, 3]",
         "\"scale\": [1, 0, 3]",
-        "full.json:58:41: $.instances[1].transform: expected a transform that can be inverted, found a matrix that cannot be inverted (determinant 0e0)",
+        "full.json:59:41: $.instances[1].transform: expected a transform that can be inverted, found a matrix that cannot be inverted (determinant 0e0)",
     );
     expect(
         "\"priority\": 3",
         "\"priority\": 1.5",
-        "full.json:53:93: $.prototypes.stone[1].priority: expected a whole number in [-1000000, 1000000], found 1.5",
+        "full.json:54:93: $.prototypes.stone[1].priority: expected a whole number in [-1000000, 1000000], found 1.5",
     );
     expect(
         "[[0, 0], [1, 0], [0, 1]]",

@@ -166,6 +166,25 @@ def test_primvars(tmp_path: Path) -> None:
     assert surface(tmp_path, connect, reader.format("none"))[0]["params"]["base_color"] == [1, 0, 0]
 
 
+def test_colours_at_corners(tmp_path: Path) -> None:
+    """displayColor that varies is read corner by corner; any other primvar that varies by its mean, which is said."""
+    reader = 'def Shader "p" {{ uniform token info:id = "UsdPrimvarReader_float3"; string inputs:varname = "{}"; float3 outputs:result }}'
+    connect = "color3f inputs:diffuseColor.connect = </m/p.outputs:result>"
+    colors = 'color3f[] primvars:{} = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)] (\n interpolation = "vertex"\n)\n rel material'
+    quad = QUAD.replace("rel material", colors.format("displayColor") .replace("rel material", colors.format("other")))
+    shader = 'def Shader "s" {{ uniform token info:id = "UsdPreviewSurface"; {}; token outputs:surface }}'.format(connect)
+    for name, exact in (("displayColor", True), ("other", False)):
+        body = f'def Material "m" {{ token outputs:surface.connect = </m/s.outputs:surface>; {shader}; {reader.format(name)} }}'
+        converted = stage(tmp_path, quad + lines(body))
+        (shape,) = converted.scene["shapes"]
+        color = converted.scene["materials"][shape["material"]]["params"]["base_color"]
+        if exact:
+            assert converted.scene["textures"][color["texture"]] == {"vertex_color": True}
+            assert "COLOR_0" in converted.mesh(shape) and converted.losses("/q") == []
+        else:
+            assert color == 0.5 and any("other" in x for x in converted.losses("/q"))
+
+
 def test_what_has_no_effect_is_said(tmp_path: Path) -> None:
     _, converted = surface(tmp_path, "float inputs:displacement = 0.5; float inputs:occlusion = 0.5; float inputs:frobnication = 1")
     losses = " ".join(converted.losses("/m/s"))

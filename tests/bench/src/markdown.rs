@@ -74,7 +74,12 @@ fn cells(f: &Fit) -> Vec<String> {
         f.slope
             .map_or("–".into(), |s| format!("{:.2} ± {:.2}", s[0], s[1])),
         f.floor.map_or("–".into(), |v| pair(v, 1e4, 1)),
-        format!("{} %", pair(f.mean_off, 100.0, 2)),
+        if f.asymptote.is_some() {
+            format!("{} %", pair(f.mean_off, 100.0, 2))
+        } else {
+            // A picture that states no variance: its mean has an unknown error.
+            format!("{:+.2} %", 100.0 * f.mean_off[0])
+        },
         format!("{:.0} MB", f.memory / 1e6),
         format!("{:.0} ms", 1e3 * f.load),
     ]

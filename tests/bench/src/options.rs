@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
 Examples:
-  resolvent bench                                       every scene but the biggest, under five minutes on two cores
+  resolvent bench                                       every scene but the two heaviest, under five minutes on two cores
   resolvent bench --full --scaling -o docs/benchmarks   everything, with the growth of costs
   resolvent bench --scene cloud_sun --against mitsuba   beside a peer, in turn
   resolvent bench --compare old.json                    what changed since, and is it more than chance?
@@ -21,7 +21,7 @@ pub struct Options {
     /// Three scenes for a moment, to see that everything works
     #[arg(long, group = "mode")]
     pub smoke: bool,
-    /// All but the biggest scene, at half the resolution (the default)
+    /// All but the two heaviest scenes, at half the resolution (the default)
     #[arg(long, group = "mode")]
     pub quick: bool,
     /// Everything at full resolution: about an hour on two cores

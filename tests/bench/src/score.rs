@@ -113,8 +113,7 @@ pub fn score(x: &Picture, r: &Picture) -> Result<Score> {
     let mut out = Score::default();
     let (mut squares, mut own, mut theirs, mut left) = (vec![], vec![], vec![], vec![]);
     let (mut sum, mut reference_sum, mut sum_variance) = (0.0, 0.0, 0.0);
-    for i in 0..x.color.len() {
-        let (c, e) = (x.color[i], r.color[i]);
+    for (i, (c, e)) in x.color.iter().zip(&r.color).enumerate() {
         if c.iter().any(|v| !v.is_finite()) {
             out.not_finite += 1;
             continue;

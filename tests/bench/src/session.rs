@@ -5,7 +5,7 @@ use crate::fit::{Point, PowerLaw};
 use crate::renderer::{Failure, Job, Renderer};
 use crate::results::{Fit, Line, Run, SceneResult};
 use crate::score::{Picture, score};
-use crate::suite::{Case, Mode, Suite, resolution};
+use crate::suite::{Case, Converged, Mode, Suite, resolution};
 use crate::volume;
 use std::path::Path;
 
@@ -69,6 +69,21 @@ pub fn measure(
     work: &Path,
     say: &dyn Fn(&str),
 ) -> Result<SceneResult> {
+    if case.converged == Converged::Stored && !suite.reference_path(case).is_file() {
+        let why = "there is no reference yet: `resolvent bench --make-references` makes it";
+        say(&format!("{}: not done: {why}", case.name));
+        return Ok(SceneResult {
+            name: case.name.to_owned(),
+            purpose: case.purpose.to_owned(),
+            resolution: [0; 2],
+            reference: "none".into(),
+            lines: Vec::new(),
+            skipped: renderers
+                .iter()
+                .map(|r| (r.name().to_owned(), why.to_owned()))
+                .collect(),
+        });
+    }
     let scene = suite.scene(case, work)?;
     let full = resolution(&scene)?;
     let reference = suite.reference(case, full, plan.coarser())?;
@@ -280,7 +295,6 @@ fn dense_volumes(scene: &Path, work: &Path) -> Result<()> {
 }
 
 fn reference_maker(suite: &Suite, case: &Case) -> String {
-    use crate::suite::Converged;
     match case.converged {
         Converged::Constant(v) => format!("exactly {v}"),
         Converged::Stored => resolvent_image::Image::read_exr(suite.reference_path(case))

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 pub enum Mode {
     /// Three scenes for a moment: does everything work?
     Smoke,
-    /// All but the biggest scene at half the resolution, in less than five minutes on two cores.
+    /// All but the two heaviest scenes at half the resolution, in less than five minutes on two cores.
     Quick,
     /// Everything at full resolution.
     Full,
@@ -146,7 +146,7 @@ pub const CASES: &[Case] = &[
         source: Source::Puffs,
         ..case(
             "puffs",
-            Mode::Quick,
+            Mode::Full,
             "A thousand media that overlap, of which each ray meets dozens.",
         )
     },

@@ -17,7 +17,7 @@ pub struct Voxels<'a> {
     /// Edge of a voxel.
     pub size: f64,
     /// The value at a voxel; those that are not 0 are active.
-    pub value: &'a (dyn Fn([i32; 3]) -> f32),
+    pub value: &'a dyn Fn([i32; 3]) -> f32,
 }
 
 /// A round cloud of about `voxels` active voxels: a ball that thins out towards its rim, with waves in it.
@@ -254,10 +254,8 @@ pub fn write_dense(vdb: &Path, grid: &str, to: &Path) -> Result<()> {
     )?;
     let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
     for_active(&topology, |at, _, _| {
-        for k in 0..3 {
-            low[k] = low[k].min(at[k]);
-            high[k] = high[k].max(at[k]);
-        }
+        low = [0, 1, 2].map(|k| at[k].min(low[k]));
+        high = [0, 1, 2].map(|k| at[k].max(high[k]));
     });
     let low = low.map(|v| v - 1);
     let shape = [0, 1, 2].map(|k| (high[k] + 2 - low[k]) as usize);

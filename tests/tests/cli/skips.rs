@@ -1,7 +1,7 @@
 //! What a scene does not have costs nothing: a table of absent features and the work that is not done for them, by the program's own
 //! counters. With `RESOLVENT_REPORT=DIR` the table is added to `DIR/skips.md`.
 
-use crate::program::{changed, folder, json, render, scene};
+use crate::program::{Run, changed, folder, json, scene};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,9 @@ const OPTIONS: [&str; 6] = ["--stats", "s.json", "--resolution", "24x16", "--spp
 const SAMPLES: f64 = 24.0 * 16.0 * 32.0;
 
 fn stats(at: &Path, input: &Path, more: &[&str]) -> Value {
-    render(at, input, "out.exr", &[&OPTIONS[..], more].concat());
+    // Not quiet: a scene without lights is warned of.
+    let args = ["render", &input.to_string_lossy(), "-o", "out.exr"];
+    Run::new(at, [&args[..], &OPTIONS, more].concat()).done();
     json(&at.join("s.json"))
 }
 

@@ -118,6 +118,27 @@ fn cases() -> Vec<Case> {
     add("box with fog", s, 24, &[]);
 
     let mut s = room(true);
+    fog(&mut s, json!(0.7), json!(0.9), 0.3);
+    s["camera"] = json!({ "type": "orthographic", "origin": [0.3, -3.6, 0.2], "target": [0, 1, 0],
+                          "up": [0, 0, 1], "width": 2.6, "shift": [0.1, -0.05] });
+    s["film"]["pixel_aspect"] = json!(1.25);
+    add("box seen by parallel rays", s, 24, &[]);
+
+    let mut s = room(false);
+    fog(&mut s, json!(0.3), json!(0.9), 0.0);
+    for lamp in [
+        json!({ "type": "disk", "center": [-0.4, 0, 0.9], "normal": [0, 0, -1], "radius": 0.25,
+                "emission": [40, 30, 20],
+                "shaping": { "axis": [0.2, -0.2, -1], "angle_deg": 110, "softness": 0.5,
+                             "focus": 2, "focus_tint": [0.3, 0, 0] } }),
+        json!({ "type": "sphere", "center": [0.5, 0.2, 0.2], "radius": 0.15, "emission": [20, 24, 40],
+                "shaping": { "axis": [0.3, -1, -0.5], "angle_deg": 160, "softness": 1 } }),
+    ] {
+        scenes::add(&mut s, "shapes", lamp);
+    }
+    add("lamps that favour directions", s, 32, &[]);
+
+    let mut s = room(true);
     bsdf(
         &mut s,
         "glass",

@@ -20,7 +20,8 @@ fn mixture() -> Vec<(&'static str, Value)> {
     room["camera"] = scenes::camera([0.1, -3.5, 0.2], [0.0, 1.0, -0.05], 50.0);
     scenes::diffuse(&mut room, "wall", json!([0.7, 0.6, 0.5]));
     room["materials"]["glass"] = json!({ "plugin": "dielectric", "params": { "ior": 1.5 } });
-    room["materials"]["metal"] = json!({ "plugin": "conductor", "params": { "roughness": 0.2 } });
+    room["materials"]["metal"] =
+        json!({ "plugin": "conductor", "params": { "metal": "Au", "roughness": 0.2 } });
     let fog = json!({
         "sigma_t": [0.2, 0.4, 1.5], "albedo": [0.99, 0.9, 0.5], "bounds": [-2, -2, -1, 2, 2, 2],
         "phase": scenes::hg(0.8)

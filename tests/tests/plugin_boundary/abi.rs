@@ -37,10 +37,10 @@ fn file(name: &str, content: &[u8]) -> PathBuf {
 /// Both versions, and who is to be updated.
 #[test]
 fn other_versions() {
-    let newer = c_phase("newer", &["ABI_MAJOR=2", "ABI_MINOR=5", "HEADER_SIZE=4096"]);
+    let newer = c_phase("newer", &["ABI_MAJOR=3", "ABI_MINOR=5", "HEADER_SIZE=4096"]);
     let words = [
-        "was built for plugin ABI 2.5",
-        "this resolvent has ABI 1",
+        "was built for plugin ABI 3.5",
+        "this resolvent has ABI 2",
         "update resolvent",
     ];
     refused(&newer, &words);
@@ -48,7 +48,7 @@ fn other_versions() {
     let older = c_phase("older", &["ABI_MAJOR=0", "ABI_MINOR=9", "HEADER_SIZE=24"]);
     let words = [
         "was built for plugin ABI 0.9",
-        "this resolvent has ABI 1",
+        "this resolvent has ABI 2",
         "must be rebuilt",
     ];
     refused(&older, &words);
@@ -181,15 +181,24 @@ fn of_another_architecture() {
         183
     };
     library[18..20].copy_from_slice(&other.to_ne_bytes());
-    refused(
-        &file("foreign", &library),
-        &["is no shared library that can be loaded here"],
-    );
-    // 32 bits.
+    let (other, own) = if cfg!(target_arch = "aarch64") {
+        ("x86-64", "AArch64")
+    } else {
+        ("AArch64", "x86-64")
+    };
+    let words = format!("it was built for {other}, and this is {own}");
+    refused(&file("foreign", &library), &[&words]);
+    // 32 bits, for a processor nobody has heard of.
     library[4] = 1;
+    library[18..20].copy_from_slice(&999u16.to_ne_bytes());
     refused(
         &file("narrow", &library),
-        &["is no shared library that can be loaded here"],
+        &["it was built for processor 999"],
+    );
+    refused(&file("dll", b"MZ and so on"), &["it was built for Windows"]);
+    refused(
+        &file("dylib", b"\xcf\xfa\xed\xfe"),
+        &["it was built for macOS"],
     );
 }
 
@@ -236,7 +245,7 @@ fn the_first_in_the_search_path_wins() {
         path
     };
     let (one, two) = (place("one", &[]), place("two", &[]));
-    let broken = place("broken", &["ABI_MAJOR=2"]);
+    let broken = place("broken", &["ABI_MAJOR=3"]);
     let found = |first: &[PathBuf]| {
         let plugin = registry_before(first).find(PluginKind::Phase, "linear");
         plugin.map(|p| p.path.clone()).map_err(|e| e.to_string())
@@ -256,13 +265,20 @@ fn the_first_in_the_search_path_wins() {
             "was built for plugin ABI 2.0",
         ],
     );
-    let listed: Vec<_> = registry_before(&[two.clone(), one, broken])
+    let listed: Vec<_> = registry_before(&[two.clone(), one.clone(), broken])
         .available()
         .into_iter()
         .filter(|(kind, name, _)| *kind == PluginKind::Phase && name == "linear")
         .map(|(.., path)| path)
         .collect();
     assert_eq!(listed, [two.join(&library)]);
+    // Those that are never used are known.
+    let found = registry_before(&[two.clone(), one.clone(), two.clone()]).found();
+    let linear = found.iter().find(|f| f.name == "linear");
+    assert_eq!(
+        linear.map(|f| &f.hides[..]),
+        Some(&[one.join(&library)][..])
+    );
 }
 
 /// A name that is nowhere: the nearest, all that are known, and where they were sought.

@@ -161,12 +161,26 @@ pub fn wedge_that_aborts() -> Option<String> {
     .errors
 }
 
-/// The library of the template that authors start from.
+/// The library of the medium that `resolvent plugin new` writes.
 pub fn template() -> &'static Path {
     static PATH: OnceLock<PathBuf> = OnceLock::new();
     PATH.get_or_init(|| {
-        let package = outside("../plugins/template", "template", "../../core/api");
-        library(&built(&package), "resolvent_medium_soft_ball")
+        let to = folder("sources").join("template");
+        drop(std::fs::remove_dir_all(&to));
+        let new = Command::new(crate::program::program())
+            .args(["plugin", "new", "soft-ball", "--kind", "medium", "--to"])
+            .arg(&to)
+            .output()
+            .unwrap_or_else(|e| panic!("{e}"));
+        assert!(
+            new.status.success(),
+            "{}",
+            String::from_utf8_lossy(&new.stderr)
+        );
+        if let Ok(lock) = std::fs::read(package().join("../Cargo.lock")) {
+            write(&to.join("Cargo.lock"), &lock);
+        }
+        library(&built(&to), "resolvent_medium_soft_ball")
     })
 }
 
@@ -189,6 +203,8 @@ pub fn unruly_folder() -> PathBuf {
 fn cc(source: &str, arguments: &[String], output: &Path) {
     let out = Command::new("cc")
         .args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-O2"])
+        .arg("-I")
+        .arg(package().join("../core/api/include"))
         .args(arguments)
         .arg(package().join("fixtures/c").join(source))
         .arg("-o")

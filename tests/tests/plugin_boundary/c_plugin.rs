@@ -92,13 +92,13 @@ fn layouts_agree() {
             "params" = params, "param_count" = param_count, "param_size" = param_size, "table" = table
         },
         "param_decl": ParamDecl {
-            "default_json" = default, "choices" = choices, "min" = min, "kind" = kind, "flags" = flags
+            "default_" = default, "choices" = choices, "min" = min, "kind" = kind, "flags" = flags
         },
         "param": ParamValue {
             "kind" = kind, "count" = count, "numbers" = numbers, "text" = text, "header" = header, "instance" = instance
         },
         "host": HostTable {
-            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture
+            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture, "texture_at" = texture_at
         },
         "create_args": CreateArgs { "params" = params, "host" = host, "to_world" = to_world, "lanes" = lanes },
         "scatter_draws": ScatterDraws {},
@@ -110,7 +110,8 @@ fn layouts_agree() {
         "closure": Closure {},
         "medium_point": MediumPoint { "lanes" = lanes },
         "surface_point": SurfacePoint {
-            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior
+            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior,
+            "color" = color
         },
         "phase_table": PhaseTable { "create" = create, "closure" = closure },
         "bsdf_table": BsdfTable { "traits" = traits, "closure" = closure, "ior" = ior },

@@ -85,20 +85,23 @@ impl Buffer {
         self.orders.as_ref().map_or(0, Layers::count)
     }
 
-    /// As [`Buffer::add`], with the sample's radiance by scattering order.
+    /// As [`Buffer::add`], with the sample's radiance by scattering order, not yet multiplied by `exposure`.
     pub fn add_orders(
         &mut self,
         x: u32,
         y: u32,
         s: &PixelSample,
         layers: &[Spectrum],
+        exposure: f32,
     ) -> Result<(), String> {
         let rejected = self.rejected;
         self.add(x, y, s)?;
         let i = ((y - self.min[1]) * self.width + (x - self.min[0])) as usize;
         match &mut self.orders {
             // What the picture left out, its layers leave out.
-            Some(orders) if self.rejected == rejected => orders.add(i, s.radiance, layers),
+            Some(orders) if self.rejected == rejected => {
+                orders.add(i, s.radiance, layers, exposure)
+            }
             _ => Ok(()),
         }
     }

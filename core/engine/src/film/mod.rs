@@ -69,7 +69,27 @@ pub struct Estimate {
     /// Samples taken.
     pub samples: u32,
     /// Degrees of freedom of the variance.
-    pub degrees: u32,
+    pub degrees: [f64; 3],
+}
+
+/// Variances of three lanes, and their degrees of freedom.
+type Spread = ([f64; 3], [f64; 3]);
+
+impl Estimate {
+    fn spread(&self) -> Option<Spread> {
+        self.variance.map(|v| (v, self.degrees))
+    }
+}
+
+/// The variance of a sum of two independent estimates, with its degrees of freedom (Satterthwaite 1946).
+fn sum_of(a: Option<Spread>, b: Option<Spread>) -> Option<Spread> {
+    let ((va, da), (vb, db)) = (a?, b?);
+    let variance = [0, 1, 2].map(|k| va[k] + vb[k]);
+    let degrees = [0, 1, 2].map(|k| {
+        let d = variance[k] * variance[k] / (va[k] * va[k] / da[k] + vb[k] * vb[k] / db[k]);
+        if d.is_finite() { d } else { da[k].min(db[k]) }
+    });
+    Some((variance, degrees))
 }
 
 /// One pixel's features: means over the samples that met something.
@@ -178,6 +198,14 @@ impl Film {
     /// Which samples tile `tile` has; of an adaptive render those of its first half.
     pub fn coverage(&self, tile: usize) -> &Coverage {
         self.tiles[tile].coverage()
+    }
+
+    /// Samples that every pixel has.
+    pub fn least_samples(&self) -> u32 {
+        (0..self.tiles.len())
+            .map(|i| self.halves().map(|h| h.tiles[i].samples()).sum())
+            .min()
+            .unwrap_or(0)
     }
 
     /// True if walks from lights have left light.
@@ -315,7 +343,10 @@ impl Film {
         let rect = tile::rect(self.window, tile);
         let mut out = Self::new([rect.min[0], rect.min[1], rect.max[0], rect.max[1]], false);
         out.pixels = rect.indices(self.window).map(|i| self.pixels[i]).collect();
-        out.tiles[0] = self.tiles[tile].clone();
+        let tile_sums = self.tiles[tile].clone();
+        let samples = u64::from(tile_sums.samples()) * rect.pixels() as u64;
+        out.pieces = (tile_sums.nets().into(), samples);
+        out.tiles[0] = tile_sums;
         let parts = self.parts.range((tile, 0)..(tile + 1, 0));
         out.parts = parts
             .map(|((_, net), part)| ((0, *net), part.clone()))
@@ -340,13 +371,13 @@ impl Film {
             return if own.samples == 0 { other } else { own };
         }
         let mean = |a: f64, b: f64| 0.5 * (a + b);
-        let variances = own.variance.zip(other.variance);
+        let sum = sum_of(own.spread(), other.spread());
         Estimate {
             mean: [0, 1, 2].map(|k| mean(own.mean[k], other.mean[k])),
-            variance: variances.map(|(a, b)| [0, 1, 2].map(|k| 0.25 * (a[k] + b[k]))),
+            variance: sum.map(|(v, _)| v.map(|v| 0.25 * v)),
             alpha: mean(own.alpha, other.alpha),
             samples: own.samples + other.samples,
-            degrees: own.degrees + other.degrees,
+            degrees: sum.map_or([0.0; 3], |(_, d)| d),
         }
     }
 
@@ -356,24 +387,27 @@ impl Film {
         let (samples, nets) = (tile.samples(), tile.nets());
         let n = f64::from(samples.max(1));
         let mut mean = p.sum.map(|s| float(s) / n);
-        let mut variance = (nets >= 2).then(|| {
-            [0, 1, 2].map(|lane| {
+        let degrees = f64::from(nets) - 1.0;
+        let mut spread = (nets >= 2).then(|| {
+            let variance = [0, 1, 2].map(|lane| {
                 let spread = p.squares[lane].float() - n * mean[lane] * mean[lane];
-                spread.max(0.0) / (f64::from(nets - 1) * n)
-            })
+                spread.max(0.0) / (degrees * n)
+            });
+            (variance, [degrees; 3])
         });
         if let Some(splats) = &self.splats {
             let (m, v) = splats.estimate(i, self.pieces);
             mean = [0, 1, 2].map(|lane| mean[lane] + m[lane]);
             // A pixel's own samples and what falls on it from all others' are all but independent.
-            variance = variance.zip(v).map(|(a, b)| [0, 1, 2].map(|k| a[k] + b[k]));
+            let pieces = self.pieces.0 as f64;
+            spread = sum_of(spread, v.map(|v| (v, [pieces - 1.0; 3])));
         }
         Estimate {
             mean,
-            variance,
+            variance: spread.map(|(v, _)| v),
             alpha: float(p.alpha) / n,
             samples,
-            degrees: nets.saturating_sub(1),
+            degrees: spread.map_or([0.0; 3], |(_, d)| d),
         }
     }
 

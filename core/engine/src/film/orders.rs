@@ -34,13 +34,19 @@ impl Layers {
         self.count
     }
 
-    /// Adds a sample of pixel `i` by its layers; `radiance` is what the picture got of it.
-    pub fn add(&mut self, i: usize, radiance: Spectrum, layers: &[Spectrum]) -> Result<(), String> {
+    /// Adds a sample of pixel `i` by its layers, which `exposure` multiplies; `radiance` is what the picture got of it.
+    pub fn add(
+        &mut self,
+        i: usize,
+        radiance: Spectrum,
+        layers: &[Spectrum],
+        exposure: f32,
+    ) -> Result<(), String> {
         let sums = &mut self.sums[i * self.count..][..self.count];
         for lane in 0..3 {
             let (mut rest, mut total, mut largest) = (fix(radiance[lane]), 0f32, 0);
             for (k, (sum, layer)) in sums.iter_mut().zip(layers).enumerate() {
-                let v = layer[lane];
+                let v = layer[lane] * exposure;
                 if !fits(v) {
                     return Err(format!("gave light of {v} to the scattering order {k}"));
                 }
@@ -48,7 +54,7 @@ impl Layers {
                 sum[lane] += fixed;
                 rest -= fixed;
                 total += v.abs();
-                if v.abs() > layers[largest][lane].abs() {
+                if v.abs() > (layers[largest][lane] * exposure).abs() {
                     largest = k;
                 }
             }
@@ -171,7 +177,7 @@ mod tests {
                         radiance,
                         ..PixelSample::default()
                     };
-                    b.add_orders(x, y, &sample, &layers).unwrap();
+                    b.add_orders(x, y, &sample, &layers, 1.0).unwrap();
                 }
             }
             for k in 0..200 {
@@ -198,16 +204,18 @@ mod tests {
     fn forgotten_light_is_noticed() {
         let mut layers = Layers::new(2, 1);
         let (one, half) = (Spectrum::ONE, Spectrum::splat(0.5));
-        layers.add(0, one, &[half, half]).unwrap();
+        layers.add(0, one, &[half, half], 1.0).unwrap();
         for wrong in [
             [half, Spectrum::ZERO],
             [one, half],
             [Spectrum::splat(f32::NAN), one],
         ] {
-            layers.clone().add(0, one, &wrong).unwrap_err();
+            layers.clone().add(0, one, &wrong, 1.0).unwrap_err();
         }
         // Light that cancels leaves the rounding of what it was.
         let dust = Spectrum::splat(1e-5);
-        layers.add(0, dust, &[one, one * -1.0]).unwrap();
+        layers.add(0, dust, &[one, one * -1.0], 1.0).unwrap();
+        // Exposure multiplies layers as it has multiplied the picture.
+        layers.add(0, one, &[one, one], 0.5).unwrap();
     }
 }

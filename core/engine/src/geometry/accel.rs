@@ -6,14 +6,14 @@ use glam::Vec3;
 
 use super::build;
 use super::bvh8::Node8;
-use super::input::{Geometry, GeometryError};
+use super::input::{Geometry, GeometryError, Shape};
 use super::instance::{Instance, Place};
 use super::portable::Portable;
 use super::quadric::Quadric;
 use super::ray::{Hit, Ray, RaySetup};
 #[cfg(target_arch = "x86_64")]
 use super::simd::Avx2;
-use super::surface::{SurfacePoint, offset_origin};
+use super::surface::{Facet, SurfacePoint, offset_origin};
 use super::traverse::{self, Candidate, Start, Tree};
 use super::triangle::Packet;
 use super::two_level::{self, Instances, Placed};
@@ -25,6 +25,9 @@ pub struct Accel {
     /// Number of the first primitive of each shape, and the total.
     first: Vec<u32>,
     tree: Tree,
+    /// Where in `halves` a shape that is a quad has its own; beyond their end for other shapes.
+    quads: Vec<u32>,
+    halves: Vec<[Facet; 2]>,
     kernel: Dispatch,
     stats: AccelStats,
     instances: Option<Box<Instances>>,
@@ -125,7 +128,19 @@ impl Accel {
             stats.degenerate_triangles += i.degenerate_triangles;
         }
         stats.build_seconds = start.elapsed().as_secs_f64();
+        let (mut quads, mut halves) = (Vec::with_capacity(geometry.shapes.len()), Vec::new());
+        for shape in &geometry.shapes {
+            quads.push(match shape {
+                Shape::Quad(q) => {
+                    halves.push(Facet::halves(q));
+                    halves.len() as u32 - 1
+                }
+                _ => u32::MAX,
+            });
+        }
         Ok(Some(Self {
+            quads,
+            halves,
             first: geometry.first_primitives(),
             geometry,
             // If everything stands in instances, rays have the loose shapes behind them at once.
@@ -240,11 +255,15 @@ impl Accel {
     /// The surface at a hit of this `ray`.
     #[inline]
     pub fn interaction(&self, hit: &Hit, ray: &Ray) -> SurfacePoint {
-        match &self.instances {
+        if let Some(all) = &self.instances
+            && let Some(at) = all.interaction(hit, ray)
+        {
+            return at;
+        }
+        let quad = self.quads.get(hit.shape as usize);
+        match quad.and_then(|i| self.halves.get(*i as usize)) {
+            Some(halves) => self.geometry.interaction_of_quad(hit, ray, halves),
             None => self.geometry.interaction(hit, ray),
-            Some(all) => all
-                .interaction(hit, ray)
-                .unwrap_or_else(|| self.geometry.interaction(hit, ray)),
         }
     }
 
@@ -299,28 +318,23 @@ impl Accel {
         ray: &Ray,
         accept: impl FnMut(&Candidate) -> bool,
     ) -> Option<Candidate> {
-        let setup = RaySetup::new(ray)?;
         match self.kernel {
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2(k) => k.closest(&self.tree, &setup, accept),
-            Dispatch::Portable => {
-                traverse::closest(Portable, &self.tree, &setup, Start::of(&setup), accept)
-            }
+            Dispatch::Avx2(k) => k.closest(&self.tree, ray, accept),
+            Dispatch::Portable => closest_portable(&self.tree, ray, accept),
         }
     }
 
     #[inline(always)]
     fn any_candidate(&self, ray: &Ray, opaque: impl FnMut(&Candidate) -> bool) -> bool {
-        let Some(setup) = RaySetup::new(ray) else {
-            return false;
-        };
         match self.kernel {
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2(k) => k.occluded(&self.tree, &setup, opaque),
-            Dispatch::Portable => traverse::occluded(Portable, &self.tree, &setup, opaque),
+            Dispatch::Avx2(k) => k.occluded(&self.tree, ray, opaque),
+            Dispatch::Portable => occluded_portable(&self.tree, ray, opaque),
         }
     }
 
+    #[inline]
     fn hit(&self, c: &Candidate) -> Hit {
         let shape = self.first.partition_point(|&f| f <= c.prim) - 1;
         Hit {
@@ -331,4 +345,20 @@ impl Accel {
             v: c.v,
         }
     }
+}
+
+// Functions of their own: inlined beside the other kernel they cost it registers.
+#[inline(never)]
+fn closest_portable(
+    tree: &Tree,
+    ray: &Ray,
+    accept: impl FnMut(&Candidate) -> bool,
+) -> Option<Candidate> {
+    let ray = RaySetup::new(ray)?;
+    traverse::closest(Portable, tree, &ray, Start::of(&ray), accept)
+}
+
+#[inline(never)]
+fn occluded_portable(tree: &Tree, ray: &Ray, opaque: impl FnMut(&Candidate) -> bool) -> bool {
+    RaySetup::new(ray).is_some_and(|ray| traverse::occluded(Portable, tree, &ray, opaque))
 }

@@ -27,7 +27,7 @@ impl Avx2 {
     pub fn closest<F: FnMut(&Candidate) -> bool>(
         self,
         tree: &Tree,
-        ray: &RaySetup,
+        ray: &Ray,
         accept: F,
     ) -> Option<Candidate> {
         // SAFETY: `self` proves that AVX2 is available.
@@ -63,35 +63,27 @@ impl Avx2 {
 
     /// [`traverse::occluded`], compiled for AVX2.
     #[inline(always)]
-    pub fn occluded<F: FnMut(&Candidate) -> bool>(
-        self,
-        tree: &Tree,
-        ray: &RaySetup,
-        opaque: F,
-    ) -> bool {
+    pub fn occluded<F: FnMut(&Candidate) -> bool>(self, tree: &Tree, ray: &Ray, opaque: F) -> bool {
         // SAFETY: `self` proves that AVX2 is available.
         unsafe { occluded_avx2(self, tree, ray, opaque) }
     }
 }
 
+// The ray is set up in here, too, so that its constants stay in registers and are made with the same instructions.
 #[target_feature(enable = "avx2")]
 fn closest_avx2<F: FnMut(&Candidate) -> bool>(
     k: Avx2,
     tree: &Tree,
-    ray: &RaySetup,
+    ray: &Ray,
     accept: F,
 ) -> Option<Candidate> {
-    traverse::closest(k, tree, ray, Start::of(ray), accept)
+    let ray = RaySetup::new(ray)?;
+    traverse::closest(k, tree, &ray, Start::of(&ray), accept)
 }
 
 #[target_feature(enable = "avx2")]
-fn occluded_avx2<F: FnMut(&Candidate) -> bool>(
-    k: Avx2,
-    tree: &Tree,
-    ray: &RaySetup,
-    opaque: F,
-) -> bool {
-    traverse::occluded(k, tree, ray, opaque)
+fn occluded_avx2<F: FnMut(&Candidate) -> bool>(k: Avx2, tree: &Tree, ray: &Ray, opaque: F) -> bool {
+    RaySetup::new(ray).is_some_and(|ray| traverse::occluded(k, tree, &ray, opaque))
 }
 
 #[target_feature(enable = "avx2")]
@@ -143,7 +135,8 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn node(self, ray: &RaySetup, node: &Node8, t_max: f32) -> (u32, Near) {
         // SAFETY: `self` proves that AVX2 is available. Each load reads one row of eight f32; rows are 32 bytes apart in a
-        // struct aligned to 32. The store writes the eight f32 of `near`, aligned to 32.
+        // struct aligned to 32. `near_row` holds row numbers below 6, in pairs of which `^ 1` is the other. The store writes the
+        // eight f32 of `near`, aligned to 32.
         unsafe {
             let mut near = _mm256_set1_ps(ray.t_min);
             let mut far = _mm256_set1_ps(t_max);
@@ -151,8 +144,9 @@ impl Kernel for Avx2 {
             for axis in 0..3 {
                 let row = ray.near_row[axis];
                 let o = _mm256_set1_ps(ray.o[axis]);
-                let n = _mm256_sub_ps(_mm256_load_ps(node.bounds[row].as_ptr()), o);
-                let f = _mm256_sub_ps(_mm256_load_ps(node.bounds[row ^ 1].as_ptr()), o);
+                let bounds = |row: usize| _mm256_load_ps(node.bounds.get_unchecked(row).as_ptr());
+                let n = _mm256_sub_ps(bounds(row), o);
+                let f = _mm256_sub_ps(bounds(row ^ 1), o);
                 near = _mm256_max_ps(_mm256_mul_ps(n, _mm256_set1_ps(ray.inv_near[axis])), near);
                 far = _mm256_min_ps(_mm256_mul_ps(f, _mm256_set1_ps(ray.inv_far[axis])), far);
             }
@@ -166,19 +160,16 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn packet(self, ray: &RaySetup, packet: &Packet, t_max: f32, hits: &mut PacketHits) -> u32 {
         // SAFETY: `self` proves that AVX2 (hence SSE) is available. Each load reads one row of four f32; rows are 16 bytes
-        // apart in a struct aligned to 32. The stores write the rows of `hits`, aligned to 16.
+        // apart in a struct aligned to 32; `k` is a permutation of the three axes. The stores write the rows of `hits`, aligned to 16.
         unsafe {
             let [kx, ky, kz] = ray.k;
-            let (ox, oy, oz) = (
-                _mm_set1_ps(ray.o[kx]),
-                _mm_set1_ps(ray.o[ky]),
-                _mm_set1_ps(ray.o[kz]),
-            );
+            let origin = |axis: usize| _mm_set1_ps(*ray.o.get_unchecked(axis));
+            let (ox, oy, oz) = (origin(kx), origin(ky), origin(kz));
             let (sx, sy) = (_mm_set1_ps(ray.s[0]), _mm_set1_ps(ray.s[1]));
             let shear = |v: &[[f32; 4]; 3]| {
-                let z = _mm_sub_ps(_mm_load_ps(v[kz].as_ptr()), oz);
-                let x = _mm_sub_ps(_mm_load_ps(v[kx].as_ptr()), ox);
-                let y = _mm_sub_ps(_mm_load_ps(v[ky].as_ptr()), oy);
+                let row = |axis: usize| _mm_load_ps(v.get_unchecked(axis).as_ptr());
+                let (x, y) = (_mm_sub_ps(row(kx), ox), _mm_sub_ps(row(ky), oy));
+                let z = _mm_sub_ps(row(kz), oz);
                 (
                     _mm_sub_ps(x, _mm_mul_ps(sx, z)),
                     _mm_sub_ps(y, _mm_mul_ps(sy, z)),

@@ -27,6 +27,8 @@ pub struct SurfacePoint {
     pub uv: Vec2,
     /// ∂p/∂u. Where the coordinates do not define it: some vector in the tangent plane of `ng`.
     pub dpdu: Vec3,
+    /// Linear colour and opacity of meshes that have them; else white.
+    pub color: [f32; 4],
     /// Index of the shape.
     pub shape: u32,
     /// Primitive within the shape.
@@ -42,11 +44,25 @@ impl Geometry {
         self.interaction_apart(hit, ray, 0.0)
     }
 
+    /// [`Geometry::interaction`] on the quad `hit.shape`, whose halves are known.
+    #[inline]
+    pub(super) fn interaction_of_quad(
+        &self,
+        hit: &Hit,
+        ray: &Ray,
+        halves: &[Facet; 2],
+    ) -> SurfacePoint {
+        match &self.shapes[hit.shape as usize] {
+            Shape::Quad(q) => quad(q, hit, ray, &halves[hit.prim as usize & 1], 0.0),
+            _ => self.interaction_apart(hit, ray, 0.0),
+        }
+    }
+
     /// [`Geometry::interaction`] for a surface whose points have a further rounding error, summed over the axes.
     pub(super) fn interaction_apart(&self, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         match &self.shapes[hit.shape as usize] {
             Shape::Mesh(m) => mesh(m, hit, ray, further),
-            Shape::Quad(q) => quad(q, hit, ray, further),
+            Shape::Quad(q) => quad(q, hit, ray, &Facet::new(q.triangle(hit.prim)), further),
             Shape::Sphere(s) => sphere(s, hit, ray),
             Shape::Disk(d) => disk(d, hit, ray),
             Shape::Cylinder(c) => cylinder(c, hit, ray),
@@ -58,6 +74,9 @@ impl Geometry {
     /// True where texture coordinates run clockwise seen from outside: ∂p/∂v is on the other side of ∂p/∂u than ng × ∂p/∂u.
     pub fn uv_mirrored(&self, shape: u32, prim: u32) -> bool {
         match &self.shapes[shape as usize] {
+            Shape::Mesh(m) if !m.tangents.is_empty() => {
+                m.tangents[m.indices[prim as usize][0] as usize][3] < 0.0
+            }
             Shape::Mesh(m) if !m.uvs.is_empty() => {
                 let [a, b, c] = m.indices[prim as usize].map(|i| m.uvs[i as usize].as_dvec2());
                 (b - a).perp_dot(c - a) < 0.0
@@ -77,71 +96,100 @@ const EDGE_MARGIN: f64 = 16.0;
 /// Unit roundoff of f32.
 const ROUND: f64 = 1.0 / 16_777_216.0;
 
-/// A point on or within rounding of an edge, moved inwards by a little more than its rounding error: next to the edge, the origin of
-/// the next ray would otherwise fall behind the neighbouring triangle as often as not, and light would leak. It moves towards the
-/// centre, but no farther than that takes in corners of ordinary angles. `sides` is the
-/// squared length of the longest edge, `n` the edges' cross product, `least` the smallest barycentric weight.
-#[cold]
-fn off_edge(p: DVec3, centre: DVec3, n: DVec3, sides: f64, least: f64, margin: f64) -> DVec3 {
-    let wanted = margin * sides.sqrt() / n.length();
-    let towards = centre - p;
-    let share = ((wanted - least) / (1.0 / 3.0 - least)).min(2.5 * margin / towards.length());
-    // False also where the triangle has no area.
-    if share > 0.0 && share <= 1.0 {
-        p + towards * share
-    } else {
-        p
-    }
-}
-
-/// A point of a triangle: position and its error, edges from the first vertex, normal.
-struct Flat {
-    p: Vec3,
-    p_error: Vec3,
+/// What a point on a triangle is found from, in f64: the only rounding that matters is the last one to f32.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Facet {
+    a: DVec3,
+    /// Edges from the first vertex.
     e1: DVec3,
     e2: DVec3,
-    n: Vec3,
+    /// Their cross product, its squared length, and that of the longest edge.
+    n: DVec3,
+    n2: f64,
+    sides: f64,
+    /// Unit normal; zero if the triangle has no area.
+    normal: Vec3,
 }
 
-/// Position and normal of barycentrics (u, v), in f64: the only rounding that matters is the last one to f32.
-fn flat(vertices: [Vec3; 3], hit: &Hit, ray: &Ray, further: f64) -> Flat {
-    let a = vertices[0].as_dvec3();
-    let (e1, e2) = (vertices[1].as_dvec3() - a, vertices[2].as_dvec3() - a);
-    let (u, v) = (f64::from(hit.u), f64::from(hit.v));
-    let mut p = a + e1 * u + e2 * v;
-    let n = e1.cross(e2);
-    // The distance to an edge is its weight times the height over it, and heights are at least |n| over the longest edge.
-    let least = u.min(v).min(1.0 - u - v);
-    let sides = e1
-        .length_squared()
-        .max(e2.length_squared())
-        .max((e2 - e1).length_squared());
-    let rounding = ROUND * (p.x.abs() + p.y.abs() + p.z.abs()) + further;
-    let margin = EDGE_MARGIN * rounding;
-    if least.max(0.0).powi(2) * n.length_squared() < margin * margin * sides {
-        p = off_edge(p, a + (e1 + e2) / 3.0, n, sides, least, margin);
-    }
-    let n = match n.try_normalize() {
-        Some(n) => n.as_vec3(),
-        // Three vertices on a line, met at the gap that they cover between their neighbours: any normal, on the right side.
-        None => {
-            let back = ray.d.normalize_or(Vec3::Z);
-            let front = RaySetup::new(ray)
-                .is_none_or(|r| triangle::meets_front(&r, vertices.map(|v| v.to_array())));
-            if front { -back } else { back }
+impl Facet {
+    #[inline(always)]
+    pub fn new(vertices: [Vec3; 3]) -> Self {
+        let a = vertices[0].as_dvec3();
+        let (e1, e2) = (vertices[1].as_dvec3() - a, vertices[2].as_dvec3() - a);
+        let n = e1.cross(e2);
+        Self {
+            a,
+            e1,
+            e2,
+            n,
+            n2: n.length_squared(),
+            sides: e1
+                .length_squared()
+                .max(e2.length_squared())
+                .max((e2 - e1).length_squared()),
+            normal: n.normalize_or_zero().as_vec3(),
         }
-    };
-    let (p, p_error) = rounded(p);
-    Flat {
-        p,
-        p_error,
-        e1,
-        e2,
-        n,
+    }
+
+    /// The two of a quad.
+    pub fn halves(quad: &Quad) -> [Self; 2] {
+        [0, 1].map(|half| Self::new(quad.triangle(half)))
+    }
+
+    /// The point with the hit's barycentric weights, and its error.
+    #[inline(always)]
+    fn point(&self, hit: &Hit, further: f64) -> (Vec3, Vec3) {
+        let (u, v) = (f64::from(hit.u), f64::from(hit.v));
+        let mut p = self.a + self.e1 * u + self.e2 * v;
+        // The distance to an edge is its weight times the height over it, and heights are at least |n| over the longest edge.
+        let least = u.min(v).min(1.0 - u - v);
+        let rounding = ROUND * (p.x.abs() + p.y.abs() + p.z.abs()) + further;
+        let margin = EDGE_MARGIN * rounding;
+        if least.max(0.0).powi(2) * self.n2 < margin * margin * self.sides {
+            p = self.off_edge(p, least, margin);
+        }
+        rounded(p)
+    }
+
+    /// A point on or within rounding of an edge, moved inwards by a little more than its rounding error: next to the edge, the origin
+    /// of the next ray would otherwise fall behind the neighbouring triangle as often as not, and light would leak. It moves towards
+    /// the centre, but no farther than that takes in corners of ordinary angles. `least` is the smallest barycentric weight.
+    #[cold]
+    fn off_edge(&self, p: DVec3, least: f64, margin: f64) -> DVec3 {
+        let wanted = margin * self.sides.sqrt() / self.n.length();
+        let towards = self.a + (self.e1 + self.e2) / 3.0 - p;
+        let share = ((wanted - least) / (1.0 / 3.0 - least)).min(2.5 * margin / towards.length());
+        // False also where the triangle has no area.
+        if share > 0.0 && share <= 1.0 {
+            p + towards * share
+        } else {
+            p
+        }
+    }
+
+    /// Unit normal at a hit of `ray`.
+    #[inline(always)]
+    fn normal(&self, ray: &Ray) -> Vec3 {
+        if self.normal == Vec3::ZERO {
+            self.side_of(ray)
+        } else {
+            self.normal
+        }
+    }
+
+    /// Three vertices on a line, met at the gap that they cover between their neighbours: any normal, on the right side.
+    #[cold]
+    fn side_of(&self, ray: &Ray) -> Vec3 {
+        let back = ray.d.normalize_or(Vec3::Z);
+        let vertices = [self.a, self.a + self.e1, self.a + self.e2];
+        let front = RaySetup::new(ray)
+            .is_none_or(|r| triangle::meets_front(&r, vertices.map(|v| v.as_vec3().to_array())));
+        if front { -back } else { back }
     }
 }
 
 /// Rounds a position to f32 and bounds what that did: half a unit in the last place, and a trace for the f64 part before.
+#[inline(always)]
 fn rounded(p: DVec3) -> (Vec3, Vec3) {
     let error = p.abs() * (1.001 / 16_777_216.0);
     (
@@ -152,13 +200,9 @@ fn rounded(p: DVec3) -> (Vec3, Vec3) {
 
 fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
     let corner = m.indices[hit.prim as usize].map(|i| i as usize);
-    let Flat {
-        p,
-        p_error,
-        e1,
-        e2,
-        n: ng,
-    } = flat(corner.map(|i| m.positions[i]), hit, ray, further);
+    let facet = Facet::new(corner.map(|i| m.positions[i]));
+    let ((p, p_error), ng) = (facet.point(hit, further), facet.normal(ray));
+    let Facet { e1, e2, .. } = facet;
     let (u, v) = (hit.u, hit.v);
     let ns = if m.normals.is_empty() {
         ng
@@ -167,7 +211,7 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         let n = (n0 * (1.0 - u - v) + n1 * u + n2 * v).normalize_or(ng);
         if n.dot(ng) < 0.0 { -n } else { n }
     };
-    let (uv, dpdu) = if m.uvs.is_empty() {
+    let (uv, mut dpdu) = if m.uvs.is_empty() {
         (Vec2::new(u, v), e1.as_vec3())
     } else {
         let [t0, t1, t2] = corner.map(|i| m.uvs[i]);
@@ -184,6 +228,19 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
             },
         )
     };
+    if !m.tangents.is_empty() {
+        let along = mixed(corner.map(|i| m.tangents[i]), u, v);
+        let along = Vec3::new(along[0], along[1], along[2]);
+        // Without a part in the tangent plane it says nothing.
+        if along.cross(ns).length_squared() > 1e-12 * along.length_squared() {
+            dpdu = along;
+        }
+    }
+    let color = if m.colors.is_empty() {
+        WHITE
+    } else {
+        mixed(corner.map(|i| m.colors[i]), u, v)
+    };
     SurfacePoint {
         p,
         p_error,
@@ -191,15 +248,23 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         ns,
         uv,
         dpdu,
+        color,
         shape: hit.shape,
         prim: hit.prim,
     }
 }
 
-fn quad(q: &Quad, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
-    let Flat {
-        p, p_error, n: ng, ..
-    } = flat(q.triangle(hit.prim), hit, ray, further);
+/// Values at the corners of a triangle, interpolated.
+pub fn mixed([a, b, c]: [[f32; 4]; 3], u: f32, v: f32) -> [f32; 4] {
+    [0, 1, 2, 3].map(|i| a[i] * (1.0 - u - v) + b[i] * u + c[i] * v)
+}
+
+/// What shapes without colours have.
+const WHITE: [f32; 4] = [1.0; 4];
+
+#[inline(always)]
+fn quad(q: &Quad, hit: &Hit, ray: &Ray, facet: &Facet, further: f64) -> SurfacePoint {
+    let ((p, p_error), ng) = (facet.point(hit, further), facet.normal(ray));
     let (u, v) = (hit.u, hit.v);
     // Half 0 is corner + u·edge_u + v·(edge_u + edge_v), half 1 is corner + u·(edge_u + edge_v) + v·edge_v.
     let uv = if hit.prim == 0 {
@@ -214,6 +279,7 @@ fn quad(q: &Quad, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         ns: ng,
         uv,
         dpdu: q.edge_u,
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -243,6 +309,7 @@ fn sphere(s: &Sphere, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: ng,
         uv,
         dpdu,
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -268,6 +335,7 @@ fn disk(s: &Disk, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: s.normal,
         uv: (uv * 0.5 + 0.5).clamp(Vec2::ZERO, Vec2::ONE),
         dpdu: x.as_vec3() * (2.0 * s.radius),
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -298,6 +366,7 @@ fn cylinder(c: &Cylinder, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: ng,
         uv: Vec2::new(phi / TAU, (height / length) as f32),
         dpdu: axis.cross(n).as_vec3() * (TAU * c.radius),
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -306,6 +375,7 @@ fn cylinder(c: &Cylinder, hit: &Hit, ray: &Ray) -> SurfacePoint {
 /// Moves the origin of a ray that leaves the surface at `p` to direction `w` off the surface, to the side of `w`: along ±`ng`
 /// far enough that the new origin lies beyond the true surface whatever the rounding of `p` was, then one float further along
 /// each axis against the rounding of the move itself (pbrt §6.8.6).
+#[inline]
 pub fn offset_origin(p: Vec3, p_error: Vec3, ng: Vec3, w: Vec3) -> Vec3 {
     let distance = ng.abs().dot(p_error);
     let offset = ng * if w.dot(ng) < 0.0 { -distance } else { distance };
@@ -336,6 +406,7 @@ fn one_float(x: f32, towards: f32) -> f32 {
 
 impl SurfacePoint {
     /// [`offset_origin`] of this point.
+    #[inline]
     pub fn offset(&self, w: Vec3) -> Vec3 {
         offset_origin(self.p, self.p_error, self.ng, w)
     }

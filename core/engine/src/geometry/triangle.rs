@@ -12,9 +12,9 @@ use glam::DVec3;
 /// Triangles in one packet.
 pub(super) const LANES: usize = 4;
 
-/// Padding of a triangle's box in units of its largest extent, 8 unit roundoffs: the test moves vertices by up to 7u times the
+/// Padding of a triangle's box in units of its largest extent, 9 unit roundoffs: the test moves vertices by up to 8u times the
 /// triangle's extent in addition to what [`super::ray`] covers.
-pub(super) const PAD: f32 = 8.0 / 16_777_216.0;
+pub(super) const PAD: f32 = 9.0 / 16_777_216.0;
 
 /// |det| below this is recomputed in f64: products of f32 coordinates may have lost digits to underflow.
 pub(super) const TINY_DET: f32 = 1e-30;
@@ -131,6 +131,17 @@ pub(super) fn decide_lane(
         packet.vertex(1, lane),
         packet.vertex(2, lane),
     );
+    let s = f64::from(ray.s[2]);
+    let z = [v0, v1, v2].map(|v| f64::from(v[ray.k[2]] - ray.o[ray.k[2]]) * s);
+    let (nearest, farthest) = (z[0].min(z[1]).min(z[2]), z[0].max(z[1]).max(z[2]));
+    let (t_min, t_max_ray) = (f64::from(ray.t_min), f64::from(ray.t_max));
+    let plane = plane_distance(ray, v0, v1, v2);
+    // Most lanes are that of the triangle the ray leaves, or of the light it ends at: beyond the end whether it meets them or not.
+    if let Some(t) = plane
+        && ((t <= t_min && nearest <= t_min) || (t >= t_max_ray && farthest >= t_max_ray))
+    {
+        return None;
+    }
     let (a, b, c) = (shear(ray, v0), shear(ray, v1), shear(ray, v2));
     let u = c[0] * b[1] - c[1] * b[0];
     let v_ = a[0] * c[1] - a[1] * c[0];
@@ -143,14 +154,10 @@ pub(super) fn decide_lane(
     if det == 0.0 || det.is_nan() {
         return None;
     }
-    let s = f64::from(ray.s[2]);
-    let z = [a[2] * s, b[2] * s, c[2] * s];
     // The hit lies between the vertices; this also tames a plane seen exactly edge on.
-    let t = plane_distance(ray, v0, v1, v2).unwrap_or((u * z[0] + v_ * z[1] + w * z[2]) / det);
-    let t = t
-        .max(z[0].min(z[1]).min(z[2]))
-        .min(z[0].max(z[1]).max(z[2]));
-    if t > f64::from(ray.t_min) && t < f64::from(ray.t_max) && t as f32 <= t_max {
+    let t = plane.unwrap_or((u * z[0] + v_ * z[1] + w * z[2]) / det);
+    let t = t.max(nearest).min(farthest);
+    if t > t_min && t < t_max_ray && t as f32 <= t_max {
         Some((t as f32, (v_ / det) as f32, (w / det) as f32))
     } else {
         None

@@ -71,11 +71,11 @@ impl Bound {
         // Area seen along the axis, over the whole.
         let mut facing = 1.0;
         match &area.form {
-            AreaShape::Quad(q) => {
+            AreaShape::Quad(q, normal) => {
                 for (a, b) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
                     include(q.corner + q.edge_u * a + q.edge_v * b);
                 }
-                axis = q.edge_u.cross(q.edge_v).normalize_or(Vec3::Z);
+                axis = normal.normalize_or(Vec3::Z);
                 spread = SLACK;
             }
             AreaShape::Disk(d, _) => {

@@ -9,15 +9,18 @@ mod distribution;
 mod emission;
 mod image;
 mod select;
+mod shaping;
 mod sky;
 mod spot;
 mod tree;
 
 pub use area::{Area, AreaPoint, AreaShape};
+pub use bound::Bound;
 pub use distribution::Distribution;
 pub use emission::BoundingSphere;
 pub use image::ImageEnvironment;
 pub use select::{Chooser, Lights, Reference, TREE_FROM};
+pub use shaping::Shaping;
 pub use sky::{EFFICACY, Sky, SunSky};
 pub use spot::Spot;
 pub use tree::Tree;
@@ -138,6 +141,7 @@ impl Light {
 
     /// Chooses a point for `from` by the two numbers `u`. For infinite lights, density and radiance are this
     /// light's alone.
+    #[inline]
     pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<LightSample> {
         match self {
             Self::Constant { radiance } => {
@@ -220,6 +224,7 @@ impl Light {
 }
 
 /// Density (sr⁻¹) of a direction given the density per area at the point it leads to.
+#[inline(always)]
 fn per_solid_angle(per_area: f32, from: Vec3, at: Vec3, ng: Vec3) -> f32 {
     let d = at - from;
     let d2 = d.length_squared();
@@ -234,7 +239,7 @@ fn per_solid_angle(per_area: f32, from: Vec3, at: Vec3, ng: Vec3) -> f32 {
 /// The radiance an area light shows towards `w` from the point with normal `ng`.
 pub fn shows(area: &Area, at: &SurfacePoint, w: Vec3) -> Spectrum {
     if area.two_sided || at.ng.dot(w) > 0.0 {
-        area.radiance_at(at.uv.into())
+        area.radiance_towards(at.uv.into(), &at.color, w)
     } else {
         Spectrum::ZERO
     }

@@ -122,6 +122,11 @@ impl Instance {
         })
     }
 
+    /// The plugin's header and this instance, for callers that drive it by its C tables themselves.
+    pub fn raw(&self) -> (&'static abi::PluginHeader, *const c_void) {
+        (self.plugin.header, self.pointer)
+    }
+
     /// An error of the plugin, with the place of its block in the scene.
     pub(super) fn error(&self, why: &str) -> Error {
         let (file, place) = &self.at;

@@ -32,6 +32,12 @@ impl Plugin {
             Ok(m) if !m.is_file() => return Err(fail("is no file".into())),
             Ok(_) => {}
         }
+        #[cfg(target_os = "linux")]
+        super::image::check(path).map_err(|why| {
+            fail(format!(
+                "is no shared library that can be loaded here: {why}"
+            ))
+        })?;
         // SAFETY: loading a library runs its initialisers; a plugin is code that the user chose to run.
         let library = unsafe { libloading::Library::new(path) }.map_err(|e| {
             let why = reason(&e, path);
@@ -50,6 +56,14 @@ impl Plugin {
         // Never unloaded: instances, closures and thread-locals of the library may outlive any scope here.
         std::mem::forget(library);
         Self::from_header(address.cast(), path)
+    }
+
+    /// A plugin that is linked into the program.
+    ///
+    /// # Errors
+    /// As [`Plugin::open`].
+    pub(super) fn linked(header: &'static PluginHeader) -> Result<Self> {
+        Self::from_header(header, Path::new("(part of the program)"))
     }
 
     fn from_header(header: *const PluginHeader, path: &Path) -> Result<Self> {

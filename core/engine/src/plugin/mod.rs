@@ -3,13 +3,15 @@
 mod declare;
 mod foreign;
 mod host;
+#[cfg(target_os = "linux")]
+mod image;
 mod instance;
 mod load;
 mod registry;
 
 pub use foreign::{ForeignBsdf, ForeignIntegrator, ForeignMedium, ForeignPhase};
-pub use host::{Message, set_log};
-pub(crate) use host::{pending_failure, warn};
+pub(crate) use host::warn;
+pub use host::{Message, pending_failure, set_log};
 pub use instance::Instance;
 pub use load::Plugin;
-pub use registry::Registry;
+pub use registry::{Found, Registry};

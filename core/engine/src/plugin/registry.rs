@@ -4,6 +4,7 @@ use super::instance::{Instance, nested_blocks};
 use super::load::Plugin;
 use crate::error::{Error, Result};
 use crate::texture::{Binding, Textures};
+use resolvent_api::abi::PluginHeader;
 use resolvent_api::{Affine, PluginKind};
 use resolvent_scene::{Checked, PluginBlock, Problem, Scene, nearest};
 use std::collections::BTreeMap;
@@ -16,7 +17,22 @@ pub const PATH_VARIABLE: &str = "RESOLVENT_PLUGIN_PATH";
 /// The search path and the plugins loaded so far.
 pub struct Registry {
     folders: Vec<PathBuf>,
+    /// Plugins that are part of the program.
+    linked: Vec<Arc<Plugin>>,
     loaded: Mutex<BTreeMap<PathBuf, Arc<Plugin>>>,
+}
+
+/// A library in the search path whose name is that of a plugin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Kind, by the file's name.
+    pub kind: PluginKind,
+    /// Name, by the file's name.
+    pub name: String,
+    /// The library.
+    pub path: PathBuf,
+    /// Libraries of the same kind and name later in the search path: they are never used.
+    pub hides: Vec<PathBuf>,
 }
 
 impl Registry {
@@ -42,8 +58,19 @@ impl Registry {
         }
         Self {
             folders,
+            linked: Vec::new(),
             loaded: Mutex::default(),
         }
+    }
+
+    /// Adds a plugin that is linked into the program, by the header that its library would export: it comes before all in the search
+    /// path.
+    ///
+    /// # Errors
+    /// As for one that is loaded.
+    pub fn link(&mut self, header: &'static PluginHeader) -> Result<()> {
+        self.linked.push(Arc::new(Plugin::linked(header)?));
+        Ok(())
     }
 
     /// The search path.
@@ -63,7 +90,13 @@ impl Registry {
 
     /// Every library in the search path whose name is that of a plugin, the first of each name only, without loading any.
     pub fn available(&self) -> Vec<(PluginKind, String, PathBuf)> {
-        let mut out: Vec<(PluginKind, String, PathBuf)> = Vec::new();
+        let found = self.found().into_iter();
+        found.map(|f| (f.kind, f.name, f.path)).collect()
+    }
+
+    /// The same, with the libraries that are hidden by those: of the same kind and name, but later in the search path.
+    pub fn found(&self) -> Vec<Found> {
+        let mut out: Vec<Found> = Vec::new();
         for folder in &self.folders {
             let Ok(entries) = std::fs::read_dir(folder) else {
                 continue;
@@ -74,12 +107,20 @@ impl Registry {
                 let Some((kind, name)) = Self::parse(&path) else {
                     continue;
                 };
-                if !out.iter().any(|(k, n, _)| *k == kind && *n == name) {
-                    out.push((kind, name, path));
+                match out.iter_mut().find(|f| f.kind == kind && f.name == name) {
+                    // A folder may be named twice.
+                    Some(first) if same(&first.path, &path) => {}
+                    Some(first) => first.hides.push(path),
+                    None => out.push(Found {
+                        kind,
+                        name,
+                        path,
+                        hides: vec![],
+                    }),
                 }
             }
         }
-        out.sort();
+        out.sort_by(|a, b| (a.kind, &a.name).cmp(&(b.kind, &b.name)));
         out
     }
 
@@ -99,6 +140,10 @@ impl Registry {
     /// # Errors
     /// If it is not found (with what is, and the nearest name) or cannot be loaded.
     pub fn find(&self, kind: PluginKind, name: &str) -> Result<Arc<Plugin>> {
+        let mut linked = self.linked.iter();
+        if let Some(plugin) = linked.find(|p| p.kind == kind && p.name() == name) {
+            return Ok(plugin.clone());
+        }
         let file = Self::file_name(kind, name);
         for folder in &self.folders {
             let path = folder.join(&file);
@@ -248,6 +293,14 @@ impl Registry {
             &resolve,
             (file, &block.place),
         )
+    }
+}
+
+/// True if both lead to the same file.
+fn same(a: &Path, b: &Path) -> bool {
+    match (a.canonicalize(), b.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => a == b,
     }
 }
 

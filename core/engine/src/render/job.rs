@@ -2,7 +2,7 @@
 
 use super::{Goal, Keep, Progress, Settings, piece};
 use crate::checkpoint::State;
-use crate::film::{Film, Rect};
+use crate::film::Rect;
 use crate::plugin::ForeignIntegrator;
 use crate::scene::Scene;
 use resolvent_api::abi::Tile;
@@ -204,15 +204,5 @@ impl<'j> Job<'j> {
         state.seconds = seconds;
         let error = self.error.into_inner().unwrap_or_else(|e| e.into_inner());
         (state, error)
-    }
-}
-
-impl Film {
-    /// Samples that every pixel has.
-    pub fn least_samples(&self) -> u32 {
-        (0..self.tiles().len())
-            .map(|i| self.halves().map(|h| h.coverage(i).samples()).sum())
-            .min()
-            .unwrap_or(0)
     }
 }

@@ -28,6 +28,7 @@ pub fn render(
     let wanted = samples.len();
     let mut sink = Sink {
         buffer: Buffer::new(tile.min, tile.max, samples, tile.features != 0).with_orders(orders),
+        exposure: scene.camera.exposure(),
         error: None,
     };
     let out = OutputTable {
@@ -66,6 +67,8 @@ pub fn render(
 
 struct Sink {
     buffer: Buffer,
+    /// Factor on all light. Integrators do not see it: none of their decisions depends on it.
+    exposure: f32,
     error: Option<String>,
 }
 
@@ -79,8 +82,19 @@ impl Sink {
         Status::ERROR
     }
 
+    fn expose(&self, sample: &PixelSample) -> PixelSample {
+        PixelSample {
+            radiance: sample.radiance * self.exposure,
+            ..*sample
+        }
+    }
+
     fn splat(&mut self, film: [f32; 2], radiance: Spectrum, order: u32) -> Status {
-        if !self.buffer.splats.add_order(film, radiance, order) {
+        if !self
+            .buffer
+            .splats
+            .add_order(film, radiance * self.exposure, order)
+        {
             self.buffer.rejected += 1;
             let at = film.map(|v| v.max(0.0) as u32);
             self.buffer.rejected_at.get_or_insert(at);
@@ -95,7 +109,8 @@ unsafe extern "C" fn add(ctx: *mut c_void, x: u32, y: u32, sample: *const PixelS
     if sink.buffer.orders() > 0 {
         return sink.fail(UNORDERED.into());
     }
-    match sink.buffer.add(x, y, sample) {
+    let exposed = sink.expose(sample);
+    match sink.buffer.add(x, y, &exposed) {
         Ok(()) => Status::OK,
         Err(why) => sink.fail(why),
     }
@@ -116,7 +131,8 @@ unsafe extern "C" fn add_orders(
     }
     // SAFETY: there are as many layers as the table asks for.
     let layers = unsafe { std::slice::from_raw_parts(layers, count) };
-    match sink.buffer.add_orders(x, y, sample, layers) {
+    let (exposed, exposure) = (sink.expose(sample), sink.exposure);
+    match sink.buffer.add_orders(x, y, &exposed, layers, exposure) {
         Ok(()) => Status::OK,
         Err(why) => sink.fail(why),
     }

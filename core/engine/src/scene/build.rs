@@ -2,14 +2,13 @@
 
 use super::instances::{Copies, Groups, emits};
 use super::interiors::{Collected, Interior, Interiors};
-use super::lights::{area, distant_light, emission_texture, spectrum, sun_sky};
+use super::lights::{area, distant_light, emission_texture, shaping, spectrum, sun_sky};
 use super::shapes::{Wide, affine};
 use super::{Material, NormalMap, PlacedMedium, Surface};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
-use crate::light::{Area, BoundingSphere, Light, Lights};
+use crate::light::{Area, Bound, BoundingSphere, Light, Lights};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
 use crate::texture::{ReadImage, Textures};
 use glam::DVec3;
@@ -59,6 +58,8 @@ pub struct Scene {
     pub lanes: u32,
     /// The point of the world that is the origin of everything here.
     pub centre: DVec3,
+    /// See [`Scene::starts`].
+    pub(crate) starts: Vec<Option<u64>>,
     /// The images that textures in use were read from.
     pub textures: Vec<ReadImage>,
     /// What building took.
@@ -177,7 +178,9 @@ impl Scene {
             if let Some(e) = described.emission.filter(|_| emits(described)) {
                 let (index, sides) = (shapes.len() as u32, described.two_sided);
                 let glow = emission_texture(described, scene, &textures)?;
-                let emitter = area(&shape, index, spectrum(e), sides).textured(glow);
+                let emitter = area(&shape, index, spectrum(e), sides)
+                    .textured(glow)
+                    .shaped(shaping(described));
                 lights.push(Light::Area(emitter));
                 surface.light = Some(lights.len() as u32 - 1);
                 surface.null = false;
@@ -231,15 +234,23 @@ impl Scene {
         let accel = Accel::build_instanced(Geometry { shapes }, prototypes, &placed)
             .map_err(|e| Error::Input(format!("{}: {e}", scene.source.file.display())))?;
         let mut copies = match &accel {
-            Some(accel) if accel.stats().instances > 0 => {
-                groups.surfaces(accel, &placed, &mut behind, |described, shape, at, size| {
+            Some(accel) if accel.stats().instances > 0 => groups.surfaces(
+                accel,
+                &placed,
+                &mut behind,
+                |described, shape, at, size, to_world| {
                     let radiance = spectrum(described.emission.unwrap_or_default());
                     let emitter = area(shape, at, radiance, described.two_sided);
                     let glow = emission_texture(described, scene, &textures)?;
-                    lights.push(Light::Area(emitter.made_of(size).textured(glow)));
+                    let turned = shaping(described).map(|s| {
+                        let axis = to_world.vector(s.axis().as_dvec3());
+                        s.about(axis.try_normalize().map_or(s.axis(), |a| a.as_vec3()))
+                    });
+                    let emitter = emitter.made_of(size).textured(glow).shaped(turned);
+                    lights.push(Light::Area(emitter));
                     Ok(lights.len() as u32 - 1)
-                })?
-            }
+                },
+            )?,
             _ => Copies::default(),
         };
         let interiors = collected
@@ -260,7 +271,8 @@ impl Scene {
             bounds = bounds.union(m.medium.info.bounds);
         }
         if let Some(accel) = &accel {
-            bounds = shapes_bounds(accel.geometry(), bounds);
+            let shapes = &accel.geometry().shapes;
+            bounds = shapes.iter().fold(bounds, |b, s| shape_bounds(s, b));
             if let Some((lo, hi)) = accel.instance_bounds() {
                 bounds = bounds.including(lo).including(hi);
             }
@@ -274,15 +286,7 @@ impl Scene {
         let lights = Lights::new(lights, BoundingSphere { center, radius }, lanes);
 
         let camera_pose = to_local.after(&camera_to_world);
-        let c = &scene.camera;
-        let camera = Camera::new(
-            &camera_pose,
-            c.fov_x_deg,
-            scene.film.resolution,
-            c.lens_radius,
-            c.focus_distance,
-            Filter::new(scene.film.filter),
-        );
+        let camera = Camera::new(&camera_pose, &scene.camera, &scene.film);
         let has_passable_surfaces = surfaces
             .iter()
             .chain(copies.surfaces())
@@ -313,6 +317,7 @@ impl Scene {
             traits,
             lanes,
             centre,
+            starts: Vec::new(),
             textures: textures.read(),
             preparation: Preparation {
                 media_seconds,
@@ -321,8 +326,41 @@ impl Scene {
             },
         };
         built.camera.inside = built.interiors_at(built.camera.origin());
+        built.starts = built.starts();
         built.preparation.total_seconds = start.elapsed().as_secs_f64();
         Ok(built)
+    }
+
+    /// The interiors that walks from each light start in, where that is the same all over it: lights without extent, and those
+    /// clear of everything that is filled.
+    fn starts(&self) -> Vec<Option<u64>> {
+        let mut filled = Aabb::EMPTY;
+        if let Some(accel) = &self.accel {
+            let shapes = accel.geometry().shapes.iter().zip(&self.surfaces);
+            for (shape, _) in shapes.filter(|(_, s)| s.interior.is_some()) {
+                filled = shape_bounds(shape, filled);
+            }
+            let copied = self.copies.surfaces().iter();
+            if let Some((lo, hi)) = accel.instance_bounds()
+                && copied.map(|s| s.interior).any(|i| i.is_some())
+            {
+                filled = filled.including(lo).including(hi);
+            }
+        }
+        // Wide enough for rays that were moved off the light.
+        let pad = 1e-4 * filled.extent();
+        let (lo, hi) = (Vec3::from(filled.min) - pad, Vec3::from(filled.max) + pad);
+        let start = |light: &Light| match light {
+            _ if filled.is_empty() => Some(0),
+            Light::Point { position, .. } => Some(self.interiors_at(*position)),
+            Light::Spot(spot) => Some(self.interiors_at(spot.position)),
+            _ => {
+                let at = Bound::of(light, self.lanes)?;
+                let clear = at.hi.cmplt(lo).any() || at.lo.cmpgt(hi).any();
+                clear.then_some(0)
+            }
+        };
+        self.lights.all.iter().map(start).collect()
     }
 
     /// How many primitives can be hit, 0 without a hierarchy.
@@ -439,36 +477,29 @@ fn centre(scene: &describe::Scene, shapes: &[Wide], groups: &Groups, camera: DVe
     }
 }
 
-fn shapes_bounds(geometry: &Geometry, mut bounds: Aabb) -> Aabb {
-    for shape in &geometry.shapes {
-        match shape {
-            Shape::Sphere(s) => {
-                let r = Vec3::splat(s.radius);
-                bounds = bounds.including(s.center - r).including(s.center + r);
-            }
-            Shape::Disk(d) => {
-                let r = Vec3::splat(d.radius);
-                bounds = bounds.including(d.center - r).including(d.center + r);
-            }
-            Shape::Cylinder(c) => {
-                let r = Vec3::splat(c.radius);
-                for p in [c.base, c.base + c.axis] {
-                    bounds = bounds.including(p - r).including(p + r);
-                }
-            }
-            Shape::Quad(q) => {
-                for (a, b) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
-                    bounds = bounds.including(q.corner + q.edge_u * a + q.edge_v * b);
-                }
-            }
-            Shape::Mesh(m) => {
-                for p in &m.positions {
-                    bounds = bounds.including(*p);
-                }
-            }
+fn shape_bounds(shape: &Shape, bounds: Aabb) -> Aabb {
+    match shape {
+        Shape::Sphere(s) => {
+            let r = Vec3::splat(s.radius);
+            bounds.including(s.center - r).including(s.center + r)
         }
+        Shape::Disk(d) => {
+            let r = Vec3::splat(d.radius);
+            bounds.including(d.center - r).including(d.center + r)
+        }
+        Shape::Cylinder(c) => {
+            let r = Vec3::splat(c.radius);
+            [c.base, c.base + c.axis]
+                .iter()
+                .fold(bounds, |b, p| b.including(p - r).including(p + r))
+        }
+        Shape::Quad(q) => [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+            .iter()
+            .fold(bounds, |b, (s, t)| {
+                b.including(q.corner + q.edge_u * *s + q.edge_v * *t)
+            }),
+        Shape::Mesh(m) => m.positions.iter().fold(bounds, |b, p| b.including(*p)),
     }
-    bounds
 }
 
 /// The facts that choose the kernels.

@@ -188,6 +188,7 @@ impl<'s> View<'s> {
             sense,
             emit,
             emission_density,
+            radiance,
         }
     }
 }
@@ -392,7 +393,8 @@ unsafe extern "C" fn emit(
         Some(mut ray) => {
             // Lights at infinity stand outside everything.
             if !vertex.is_infinite() {
-                ray.inside = scene.interiors_at(ray.o.into());
+                let start = scene.starts.get(vertex.light as usize).copied().flatten();
+                ray.inside = start.unwrap_or_else(|| scene.interiors_at(ray.o.into()));
             }
             // SAFETY: as above.
             unsafe { *out = ray };
@@ -410,6 +412,17 @@ unsafe extern "C" fn emission_density(
 ) -> Status {
     // SAFETY: as above.
     unsafe { *out = view(ctx).scene.lights.emission_density(&*light, &*to) };
+    Status::OK
+}
+
+unsafe extern "C" fn radiance(
+    ctx: *const c_void,
+    light: *const Vertex,
+    to: *const Vertex,
+    out: *mut Spectrum,
+) -> Status {
+    // SAFETY: as above.
+    unsafe { *out = view(ctx).scene.lights.radiance(&*light, &*to) };
     Status::OK
 }
 

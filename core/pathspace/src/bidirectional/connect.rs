@@ -3,7 +3,7 @@
 use super::depth;
 use super::draws::{Draws, End};
 use super::path::Joint;
-use super::subpath::{Subpath, towards};
+use super::subpath::{Subpath, sensor_vertex, towards};
 use super::verify::Verified;
 use crate::mis::{self, Heuristic, MediaDensities, Strategies};
 use crate::sampler::Purpose;
@@ -285,15 +285,11 @@ impl Bidirectional {
             return Ok(None);
         };
         let wi = Vec3::from(sensor.target.wi);
-        let z = Vertex {
-            kind: VertexKind::Sensor as u32,
-            p: sensor.target.p,
-            ..Vertex::empty()
-        };
+        let z = sensor_vertex(sensor.target.p, wi, sensor.target.flags);
         let (start, e) = if s == 1 {
             (
                 Spectrum::splat((1.0 / ny.forward) as f32),
-                shown(scene, y, &z)?,
+                shown(scene, y, &sensor_vertex(sensor.target.p, wi, 0))?,
             )
         } else {
             (ny.beta.f, scatter::eval(scene, y, wi, Mode::Importance)?)
@@ -305,7 +301,11 @@ impl Bidirectional {
         let Some(edge) = scene.connect(y, &sensor.target, &u)? else {
             return Ok(None);
         };
-        let d2 = f64::from(sensor.target.distance).powi(2);
+        let d2 = if z.is_infinite() {
+            1.0
+        } else {
+            f64::from(sensor.target.distance).powi(2)
+        };
         let importance = f64::from(sensor.target.density);
         let f = start * e.f * edge.value * (importance / d2) as f32;
         let p = ny.beta.p * mis::track(&edge);
@@ -500,9 +500,9 @@ fn emitter(light: &LightSample) -> Vertex {
 /// Radiance of the light's vertex `y` towards the sensor `z`, times its cosine, as if it had scattered.
 fn shown(scene: &SceneView<'_>, y: &Vertex, z: &Vertex) -> Outcome<ScatterEval> {
     let mut e = ScatterEval::default();
-    // Lights without extent can't be seen; others show only the sides that they send rays from.
-    if y.is(VertexKind::Surface) && scene.emission_density(y, z)?[1] > 0.0 {
-        e.f = y.emitted * y.cosine(towards(y, z));
+    // Lights without extent can't be seen.
+    if y.is(VertexKind::Surface) {
+        e.f = scene.radiance(y, z)? * y.cosine(towards(y, z));
     }
     Ok(e)
 }

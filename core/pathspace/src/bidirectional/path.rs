@@ -196,8 +196,12 @@ impl Path {
     pub fn contribution(&self, scene: &SceneView<'_>) -> Outcome<Product> {
         let n = self.edges.len();
         let light = &self.vertices[0];
+        let shown = match light.is(VertexKind::Surface) {
+            true => scene.radiance(light, &self.vertices[1])?,
+            false => light.emitted,
+        };
         let mut f = Product::default();
-        f.times(light.emitted.0.map(f64::from));
+        f.times(shown.0.map(f64::from));
         f.scale(self.importance);
         if !light.is_infinite() {
             f.scale(f64::from(light.cosine(self.direction(0))));

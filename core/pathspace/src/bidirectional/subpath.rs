@@ -8,7 +8,7 @@ use crate::sampler::Purpose;
 use crate::{roulette, scatter};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::operator::{Mode, ScatterSample};
-use resolvent_api::vertex::{CameraRay, Edge};
+use resolvent_api::vertex::{CameraRay, Edge, vertex_flags};
 use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
 
 /// A vertex of a subpath.
@@ -136,11 +136,7 @@ impl Subpath {
         self.clear();
         let first = self.push();
         let node = &mut self.nodes[first];
-        node.vertex = Vertex {
-            kind: VertexKind::Sensor as u32,
-            p: ray.o,
-            ..Vertex::empty()
-        };
+        node.vertex = sensor_vertex(ray.o, -Vec3::from(ray.d), ray.flags);
         node.beta = Throughput::ONE;
         node.beta.f *= ray.weight;
         // The place on the lens is chosen alike by all techniques: its density cancels.
@@ -299,6 +295,18 @@ fn turn(v: &Vertex, s: &ScatterSample) -> (f64, f64) {
     let cosine = |w: [f32; 3]| f64::from(n.dot(Vec3::from(w)).abs()).max(1e-12);
     let eta = f64::from(s.eta);
     (forward / cosine(s.wi), reverse / (cosine(v.wo) * eta * eta))
+}
+
+/// The vertex on the sensor at `p`, which lies in direction `to` of what it sees; `flags` are the camera's. Parallel rays come from
+/// infinity, as far as densities are concerned.
+pub(super) fn sensor_vertex(p: [f32; 3], to: Vec3, flags: u32) -> Vertex {
+    let parallel = flags & vertex_flags::PARALLEL != 0;
+    Vertex {
+        kind: VertexKind::Sensor as u32,
+        flags: if parallel { vertex_flags::INFINITE } else { 0 },
+        p: if parallel { to.into() } else { p },
+        ..Vertex::empty()
+    }
 }
 
 /// Unit direction from one vertex to the next; towards a vertex at infinity, or away from it.

@@ -4,6 +4,7 @@
 //! Every piece of work runs a chain of its own over the whole picture. It starts from one of a set of independent paths, chosen in
 //! proportion to what they carry, and is weighted by their mean: that makes it unbiased from its first step (Veach & Guibas 1997, §5.1),
 //! and normalises it. A state decides length and strategy of its path with the rest of its numbers; large steps draw all of them anew.
+//! Sample ranges are other chains: those of ranges that divide no net of samples are, together, the chains of one render.
 //! Light that was not scattered comes from the camera's rays. Neighbouring pixels share a chain's luck: their errors go together, so
 //! a region's error is more than its pixels' variances say, and is judged by several seeds.
 //!

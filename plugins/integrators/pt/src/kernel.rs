@@ -17,7 +17,7 @@ use resolvent_api::vertex::{Edge, vertex_flags};
 use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
 use resolvent_pathspace::mis::Throughput;
 use resolvent_pathspace::orders::Tally;
-use resolvent_pathspace::sampler::Sampler;
+use resolvent_pathspace::sampler::{Bounce, Sampler};
 use resolvent_pathspace::{features, roulette, scatter};
 
 /// What paths are made with.
@@ -52,6 +52,8 @@ struct Walk {
     found: Found,
     /// Scattering events so far.
     depth: u32,
+    /// What the numbers of the next vertex share with those before.
+    shared: [f32; 2],
     /// Density of the current direction around the sun relative to isotropic, at least 1: what the light still to come
     /// is expected to be worth.
     promise: f32,
@@ -77,6 +79,7 @@ impl Kernel<'_> {
             others: 0.0,
             found: Found::Alone,
             depth: 0,
+            shared: sampler.first_point(),
             promise: 1.0,
         };
         walk.beta.f *= ray.weight;
@@ -150,17 +153,17 @@ impl Kernel<'_> {
                     break;
                 }
             }
+            let bounce = sampler.bounce(walk.depth, walk.shared);
+            walk.shared = bounce.next;
             if connects {
-                let connected =
-                    self.connect::<CHROMATIC>(here, &walk.beta, sampler, walk.depth)? * share;
+                let connected = self.connect::<CHROMATIC>(here, &walk, sampler, &bounce)? * share;
                 light += connected;
                 tally.add(order + 1, connected);
             }
             if BRANCHES && medium {
                 light += self.branch::<CHROMATIC, T>(here, &walk, sampler, tally)?;
             }
-            let (draws, chance) = sampler.scatter(walk.depth);
-            let Some(s) = scatter::sample(scene, here, draws, Mode::Radiance)? else {
+            let Some(s) = scatter::sample(scene, here, bounce.scatter, Mode::Radiance)? else {
                 break;
             };
             walk.beta.f *= s.weight;
@@ -173,7 +176,7 @@ impl Kernel<'_> {
             if let Some(sun) = self.sun {
                 self.turn(&mut walk, here, wi, sun, s.forward, medium)?;
             }
-            if !survives::<CHROMATIC>(&mut walk, chance, lanes) {
+            if !survives::<CHROMATIC>(&mut walk, bounce.roulette, lanes) {
                 break;
             }
             walk.depth += 1;
@@ -235,8 +238,9 @@ impl Kernel<'_> {
         walk.found = Found::With(e.forward);
         self.turn(&mut walk, here, wi, sun, e.forward, true)?;
         let sampler = sampler.branch(walk.depth);
-        let (_, chance) = sampler.scatter(walk.depth);
-        if !survives::<CHROMATIC>(&mut walk, chance, scene.lanes()) {
+        let numbers = sampler.bounce(walk.depth, walk.shared);
+        walk.shared = numbers.next;
+        if !survives::<CHROMATIC>(&mut walk, numbers.roulette, scene.lanes()) {
             return Ok(Spectrum::ZERO);
         }
         walk.depth += 1;
@@ -253,16 +257,15 @@ impl Kernel<'_> {
     fn connect<const CHROMATIC: bool>(
         &self,
         here: &Vertex,
-        beta: &Throughput,
+        walk: &Walk,
         sampler: &Sampler,
-        depth: u32,
+        bounce: &Bounce,
     ) -> Outcome<Spectrum> {
         let scene = self.scene;
         if here.is(VertexKind::Surface) && here.scatter.lobes() & lobes::SMOOTH == 0 {
             return Ok(Spectrum::ZERO);
         }
-        let (choice, point, chance) = sampler.light(depth);
-        let Some(light) = scene.sample_light(here, choice, point)? else {
+        let Some(light) = scene.sample_light(here, bounce.choice, bounce.point)? else {
             return Ok(Spectrum::ZERO);
         };
         let e = scatter::eval(scene, here, Vec3::from(light.wi), Mode::Radiance)?;
@@ -275,18 +278,22 @@ impl Kernel<'_> {
             // relative to isotropic scattering saves their transmittance.
             let q = roulette::connection(e.f.max_lane());
             if q < 1.0 {
-                if chance >= q {
+                if bounce.chance >= q {
                     return Ok(Spectrum::ZERO);
                 }
                 weight *= 1.0 / q;
             }
         }
-        let Some(edge) = scene.connect(here, &light, &sampler.connection(depth, beta.p))? else {
+        let Some(edge) =
+            scene.connect(here, &light, &sampler.connection(walk.depth, walk.beta.p))?
+        else {
             return Ok(Spectrum::ZERO);
         };
         let delta = light.flags & vertex_flags::DELTA != 0;
         let other = if delta { 0.0 } else { e.forward };
-        let found = beta.connected::<CHROMATIC>(&edge, light.density, other, scene.lanes());
+        let found = walk
+            .beta
+            .connected::<CHROMATIC>(&edge, light.density, other, scene.lanes());
         Ok(found * weight * light.radiance)
     }
 }

@@ -129,7 +129,7 @@ class _Surface:
         shape: Json = {"material": self.builder.ctx.scene.material(self.name, block)}
         if self.emission is not None:
             shape |= emission(self.builder, self.name, self.emission)
-        return Look(shape, self.builder.uv)
+        return Look(shape, self.builder.uv, colors=self.builder.colors)
 
 
 def emission(builder: Builder, name: str, value: Value) -> Json:
