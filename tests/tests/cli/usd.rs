@@ -95,6 +95,7 @@ def DistantLight "sun"
 {{
     float inputs:intensity = 1
     float inputs:angle = 1
+    bool inputs:normalize = 1
 }}
 "#
     )
