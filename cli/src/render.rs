@@ -105,7 +105,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let (mut image, missing) = output::image(&described, &rendered);
     output::tell_missing(&missing);
     let certainty = Certainty::of(&rendered.film);
-    certainty.warn(plan.goal);
+    certainty.tell();
     let about = About {
         input: a.input.display().to_string(),
         integrator: integrator.title(),

@@ -87,14 +87,12 @@ impl Certainty {
         }
     }
 
-    /// Says so if the error that ended the render is not to be trusted.
-    pub fn warn(&self, goal: Goal) {
+    /// Says so if the error is not to be trusted.
+    pub fn tell(&self) {
         if self.errors.is_some_and(|e| e.are_doubtful()) {
-            let text = "few pixels have most of the estimated error: light that is rare and bright may be missing, and the true error be larger than stated";
-            match goal {
-                Goal::Error(_) => console::warning(text),
-                _ => console::info(text),
-            }
+            console::info(
+                "few pixels have most of the estimated error: light that is rare and bright may be missing, and the true error be larger than stated",
+            );
         }
     }
 
