@@ -12,8 +12,8 @@ fn directions(measured: Measured) -> Vec<Vec3> {
             out.push(Vec3::new((1.0 - z * z).sqrt(), 0.0, z));
             out.push(Vec3::new(0.6, -0.8, z).normalize());
             // Next to the pole.
-            out.push(Vec3::new(z, 0.0, 1.0));
-            out.push(Vec3::new(0.0, z, -1.0));
+            out.push(Vec3::new(z, 0.0, 1.0).normalize());
+            out.push(Vec3::new(0.0, z, -1.0).normalize());
         }
     }
     if measured == Measured::Phase {

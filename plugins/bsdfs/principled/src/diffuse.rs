@@ -69,7 +69,7 @@ impl Diffuse {
         if self.roughness == 0.0 {
             return Spectrum::ONE;
         }
-        let (o, i) = (wo.z.abs(), wi.z.abs());
+        let (o, i) = (wo.z.abs().min(1.0), wi.z.abs().min(1.0));
         // Oren & Nayar's term in the form of Fujii (2013) for what is scattered once.
         let s = wo.x * wi.x + wo.y * wi.y;
         let s = if s > 0.0 { s / o.max(i) } else { s };
