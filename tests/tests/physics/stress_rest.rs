@@ -30,10 +30,11 @@ fn conservative_thick_slab() {
     };
     let s = thick(1000.0);
     let p = Precision {
-        error: [f64::INFINITY, 3e-4, f64::INFINITY],
+        error: [f64::INFINITY, 6e-4, f64::INFINITY],
         limit: 1e6,
     };
-    let m = measure(&s, "slab of 1000", &p);
+    // Without a pilot: this is thirty million flights.
+    let m = once(&s, "slab of 1000");
     out.row("slab of 1000", &m, &[(1, 0.001_676_443_15)], &p);
     out.near("R + T", m.mean[2], 1.0, 2e-5);
     if full() {
