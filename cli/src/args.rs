@@ -2,10 +2,12 @@
 
 use crate::failure::{Outcome, input};
 use crate::values::{
-    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, positive, share,
+    Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, layer,
+    positive, share,
 };
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use resolvent_engine::plugin::Registry;
+use resolvent_scene::Aov;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -13,6 +15,7 @@ Examples:
   resolvent render cloud.vdb -o cloud.png          a VDB file, with camera and light chosen for it
   resolvent render model.glb -o model.png          a glTF model, with its own camera and lights if it has some
   resolvent render scene.json -o out.exr -o out.png --spp 256
+  resolvent render shot.usd -o shot.exr --frame 12 a USD stage; `convert` writes its scene
   resolvent info cloud.vdb                         its grids, bounds and optical thickness
   resolvent compare out.exr reference.exr          is the difference more than noise?
   resolvent plugin list                            media, phase functions, materials, integrators
@@ -31,8 +34,12 @@ pub struct Args {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a scene, or a VDB file or glTF model as it is
+    /// Render a scene, or a VDB file, glTF model or USD stage as it is
     Render(Box<Render>),
+    /// Convert a USD stage to a scene
+    Convert(Convert),
+    /// Write a scene as a USD stage
+    Export(Export),
     /// Say what is in a VDB file, a glTF model, a scene or an EXR image
     Info(Info),
     /// Compare an image with a reference
@@ -63,7 +70,7 @@ Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctr
 #[derive(Debug, ClapArgs)]
 #[command(after_help = RENDER_EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
-    /// A scene (.json), an OpenVDB file (.vdb) or a glTF model (.gltf, .glb)
+    /// A scene (.json), an OpenVDB file (.vdb), a glTF model (.gltf, .glb) or a USD stage (.usd, .usda, .usdc, .usdz)
     pub input: PathBuf,
     /// Picture to write, .exr or .png; may be given several times [default: the input's name with .exr, in the current
     /// folder]
@@ -98,14 +105,16 @@ pub struct Render {
     /// Render only this window; X1 and Y1 are outside of it
     #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Picture")]
     pub crop: Option<Window>,
-    /// Further layers of EXR files
+    /// Further layers of EXR files: depth, albedo, normal (of the first collision or surface), variance (of each pixel's mean),
+    /// samples, or orders:N (light scattered 0, 1, ... N times, and the rest: layers that sum to the picture)
     #[arg(
         long,
         value_name = "LAYER",
+        value_parser = layer,
         value_delimiter = ',',
         help_heading = "Picture"
     )]
-    pub aov: Vec<Layer>,
+    pub aov: Vec<Aov>,
     /// How PNG files are made
     #[command(flatten)]
     pub tone: Tone,
@@ -117,6 +126,10 @@ pub struct Render {
     /// What to choose instead of guessing, for VDB files and models
     #[command(flatten)]
     pub guesses: Guesses,
+
+    /// How to convert, for USD stages
+    #[command(flatten)]
+    pub stage: Stage,
 
     /// Where to look for plugins first
     #[command(flatten)]
@@ -130,6 +143,91 @@ pub struct Render {
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// Options of USD stages.
+#[derive(Debug, Default, ClapArgs)]
+#[command(next_help_heading = "USD stages")]
+pub struct Stage {
+    /// Time code [default: the stage's start]
+    #[arg(long, value_name = "T", value_parser = finite, allow_hyphen_values = true)]
+    pub frame: Option<f64>,
+    /// Select a variant; may be given several times
+    #[arg(long, value_name = "/PRIM{SET=SELECTION}")]
+    pub variant: Vec<String>,
+    /// Purposes that are drawn [default: those of the render settings, else default,render]
+    #[arg(long, value_name = "LIST")]
+    pub purpose: Option<String>,
+    /// The camera [default: that of the render settings, else the first]
+    #[arg(long, value_name = "/PRIM")]
+    pub stage_camera: Option<String>,
+    /// The RenderSettings prim [default: the stage's own]
+    #[arg(long, value_name = "/PRIM")]
+    pub render_settings: Option<String>,
+    /// Level of subdivision surfaces [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=6))]
+    pub subdivision: Option<u8>,
+    /// Any loss is an error
+    #[arg(long)]
+    pub strict: bool,
+    /// Leave out prims with errors and convert the rest
+    #[arg(long)]
+    pub keep_going: bool,
+}
+
+impl Stage {
+    /// The first option given, for inputs that take none.
+    pub fn given(&self) -> Option<&'static str> {
+        first(&[
+            ("--frame", self.frame.is_some()),
+            ("--variant", !self.variant.is_empty()),
+            ("--purpose", self.purpose.is_some()),
+            ("--stage-camera", self.stage_camera.is_some()),
+            ("--render-settings", self.render_settings.is_some()),
+            ("--subdivision", self.subdivision.is_some()),
+            ("--strict", self.strict),
+            ("--keep-going", self.keep_going),
+        ])
+    }
+}
+
+/// Options of `export`.
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Example:\n  resolvent export scene.json -o scene.usda")]
+pub struct Export {
+    /// The scene (.json)
+    pub scene: PathBuf,
+    /// The stage to write (.usda, .usdc, .usd)
+    #[arg(short, long, value_name = "STAGE.usda")]
+    pub output: PathBuf,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Any loss is an error
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// Options of `convert`.
+#[derive(Debug, ClapArgs)]
+#[command(
+    after_help = "Examples:\n  resolvent convert shot.usd -o shot.json --frame 12\n  resolvent convert shot.usd -o shot.####.json --frames 1-100:2 --report losses.json\n\nMeshes and tables of instances go into a folder beside the scene. What is not converted in full is said, and listed by --report."
+)]
+pub struct Convert {
+    /// The stage (.usd, .usda, .usdc, .usdz)
+    pub stage: PathBuf,
+    /// The scene to write
+    #[arg(short, long, value_name = "SCENE.json")]
+    pub output: PathBuf,
+    /// A sequence, one scene for each frame: #### in the output is the number
+    #[arg(long, value_name = "A-B[:STEP]", conflicts_with = "frame")]
+    pub frames: Option<String>,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// How to convert
+    #[command(flatten)]
+    pub options: Stage,
 }
 
 /// How PNG files are made.
@@ -272,21 +370,6 @@ impl PluginPath {
             None => Ok(Registry::new(&self.plugin_path)),
         }
     }
-}
-
-/// Further layers.
-#[derive(Clone, Copy, Debug, PartialEq, ValueEnum)]
-pub enum Layer {
-    /// Distance to the first collision or surface
-    Depth,
-    /// Albedo there
-    Albedo,
-    /// Normal there
-    Normal,
-    /// Variance of each pixel's mean
-    Variance,
-    /// Samples taken
-    Samples,
 }
 
 /// Curves of PNG files.

@@ -15,6 +15,8 @@ pub enum Kind {
     Exr,
     /// A glTF model.
     Gltf,
+    /// A USD stage.
+    Usd,
 }
 
 /// First bytes of OpenVDB files.
@@ -39,6 +41,7 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
             "vdb" => Some(Kind::Vdb),
             "exr" => Some(Kind::Exr),
             "gltf" | "glb" => Some(Kind::Gltf),
+            "usd" | "usda" | "usdc" | "usdz" => Some(Kind::Usd),
             _ => None,
         });
     let failed = |e: std::io::Error| input(format!("{}: {e}", path.display()));
@@ -60,11 +63,13 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
         Ok(Kind::Exr)
     } else if first == *b"glTF" {
         Ok(Kind::Gltf)
+    } else if first == *b"PXR-" || first == *b"#usd" {
+        Ok(Kind::Usd)
     } else if first.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
         Ok(Kind::Scene)
     } else {
         Err(input(format!(
-            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb) nor a glTF model (.gltf, .glb)",
+            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb) nor a glTF model (.gltf, .glb) nor a USD stage (.usd, .usda, .usdc, .usdz)",
             path.display()
         )))
     }

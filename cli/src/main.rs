@@ -24,6 +24,7 @@ mod render;
 mod stats;
 mod system;
 mod template;
+mod usd;
 mod values;
 mod volume;
 
@@ -45,6 +46,8 @@ fn main() -> ExitCode {
     let args = args::Args::parse();
     let outcome = std::panic::catch_unwind(|| match args.command {
         args::Command::Render(a) => render::run(&a),
+        args::Command::Convert(a) => usd::convert(&a),
+        args::Command::Export(a) => usd::export(&a),
         args::Command::Info(a) => info::run(&a),
         args::Command::Compare(a) => compare::run(&a),
         args::Command::Merge(a) => merge::run(&a),

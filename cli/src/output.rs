@@ -87,13 +87,20 @@ pub fn check_writable(path: &Path) -> Outcome<()> {
 }
 
 /// Refuses a picture that memory cannot hold, before the system ends the program for it. `films` is how many times its sums are
-/// held.
-pub fn check_memory(window: [u32; 4], features: bool, layers: usize, films: usize) -> Outcome<()> {
+/// held; `orders` of the layers are of light by scattering order.
+pub fn check_memory(
+    window: [u32; 4],
+    features: bool,
+    [layers, orders]: [usize; 2],
+    films: usize,
+) -> Outcome<()> {
     let pixels = u64::from(window[2] - window[0]) * u64::from(window[3] - window[1]);
     let sums = size_of::<resolvent_engine::film::Pixel>()
-        + usize::from(features) * size_of::<resolvent_engine::film::FeatureSums>();
+        + usize::from(features) * size_of::<resolvent_engine::film::FeatureSums>()
+        // Walks from the sensor and from lights.
+        + orders * 2 * size_of::<[i128; 3]>();
     // The picture is held as f32, and once more while it is written.
-    let need = pixels * (films * sums + 2 * 4 * (4 + 3 * layers)) as u64;
+    let need = pixels * (films * sums + 2 * 4 * (4 + 3 * (layers + orders))) as u64;
     match crate::system::available_memory() {
         Some(free) if need > free => Err(input(format!(
             "a picture of {} x {} pixels needs {} of memory, {} are free: render it in parts with --crop",
@@ -150,7 +157,9 @@ pub fn image(scene: &Scene, rendered: &Rendered) -> (Image, Vec<Aov>) {
         features.iter().map(|x| f(x) as f32).collect()
     };
     let mut missing = Vec::new();
-    for aov in Aov::ALL.into_iter().filter(|a| scene.film.aovs.contains(a)) {
+    let mut aovs = scene.film.aovs.clone();
+    aovs.sort();
+    for aov in aovs {
         let name = aov.name();
         match aov {
             Aov::Depth => image.push(name, [("Z", per_feature(&|f| f.depth))]),
@@ -170,6 +179,19 @@ pub fn image(scene: &Scene, rendered: &Rendered) -> (Image, Vec<Aov>) {
                     ("Z", per_feature(&|f| f.normal[2])),
                 ],
             ),
+            Aov::Orders(n) if film.orders() != n as usize + 2 => missing.push(aov),
+            Aov::Orders(n) => {
+                for k in 0..=n as usize + 1 {
+                    let of = |i: usize, lane: usize| film.order(i, k)[lane] as f32;
+                    let lane = |lane: usize| (0..count).map(|i| of(i, lane)).collect();
+                    let name = if k <= n as usize {
+                        format!("order{k}")
+                    } else {
+                        "order_rest".to_owned()
+                    };
+                    image.push(&name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
+                }
+            }
             Aov::Samples => image.push(name, [("N", of(&|e| f64::from(e.samples)))]),
             Aov::Variance if estimates.iter().all(|e| e.variance.is_none()) => missing.push(aov),
             // A pixel that was interrupted before its variance could be known says so.

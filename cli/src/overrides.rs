@@ -1,9 +1,9 @@
 //! What the command line changes in a scene, and the work that follows.
 
-use crate::args::{Layer, Render};
+use crate::args::Render;
 use crate::failure::{Outcome, input};
 use resolvent_engine::Goal;
-use resolvent_scene::{Aov, Budget, PluginBlock, Scene};
+use resolvent_scene::{Budget, PluginBlock, Scene};
 use std::ops::Range;
 use std::time::Duration;
 
@@ -40,17 +40,10 @@ pub fn apply(a: &Render, scene: &mut Scene) -> Outcome<Plan> {
             "{whose} {x0},{y0},{x1},{y1} leaves the picture of {w}x{h} pixels"
         )));
     }
-    for layer in &a.aov {
-        let aov = match layer {
-            Layer::Depth => Aov::Depth,
-            Layer::Albedo => Aov::Albedo,
-            Layer::Normal => Aov::Normal,
-            Layer::Variance => Aov::Variance,
-            Layer::Samples => Aov::Samples,
-        };
-        if !scene.film.aovs.contains(&aov) {
-            scene.film.aovs.push(aov);
-        }
+    for aov in &a.aov {
+        // Of layers by scattering order, the last number given counts.
+        scene.film.aovs.retain(|b| b.name() != aov.name());
+        scene.film.aovs.push(*aov);
     }
     if let Some(seed) = a.seed {
         scene.sampling.seed = seed;

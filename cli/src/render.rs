@@ -65,7 +65,8 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let halves = 1 + usize::from(matches!(plan.goal, Goal::Error(_)));
     let films = halves * (1 + usize::from(keeper.is_some()));
     let layers = described.film.aovs.len();
-    output::check_memory(described.film.window(), features, layers, films)?;
+    let orders = described.film.order_layers();
+    output::check_memory(described.film.window(), features, [layers, orders], films)?;
 
     let cpu = crate::system::cpu_seconds().unwrap_or(0.0);
     let rendered = render(
@@ -151,7 +152,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
 /// An error of the scene that was guessed for a volume or a model has no place in a file: then it names that.
 fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
     let (text, path) = (error.to_string(), a.input.display().to_string());
-    if matches!(kind, Kind::Vdb | Kind::Gltf) && !text.contains(&path) {
+    if matches!(kind, Kind::Vdb | Kind::Gltf | Kind::Usd) && !text.contains(&path) {
         return input(format!("{path}: {text}"));
     }
     input(text)
@@ -159,20 +160,33 @@ fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
 
 /// The description of what to render.
 fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
+    if let (Kind::Scene | Kind::Usd, Some(option)) = (kind, a.guesses.given()) {
+        let what = if kind == Kind::Usd {
+            "USD stage"
+        } else {
+            "scene"
+        };
+        return Err(input(format!(
+            "{option} is for VDB files and models; {} is a {what}, which says this itself",
+            a.input.display()
+        )));
+    }
+    if let (true, Some(option)) = (kind != Kind::Usd, a.stage.given()) {
+        return Err(input(format!(
+            "{option} is for USD stages; {} is none",
+            a.input.display()
+        )));
+    }
     match kind {
-        Kind::Scene => {
-            if let Some(option) = a.guesses.given() {
-                return Err(input(format!(
-                    "{option} is for VDB files and models; {} is a scene, which says this itself",
-                    a.input.display()
-                )));
-            }
-            describe::Scene::read(&a.input).map_err(input)
+        Kind::Scene => describe::Scene::read(&a.input).map_err(input),
+        Kind::Usd => {
+            let scene = crate::usd::scene(&a.input, &a.stage)?;
+            describe::Scene::read(scene).map_err(input)
         }
         Kind::Vdb => crate::guess::scene(&a.input, a),
         Kind::Gltf => crate::guess::model(&a.input, a),
         Kind::Exr => Err(input(format!(
-            "{}: is an image; render takes a scene (.json), an OpenVDB file (.vdb) or a glTF model (.gltf, .glb)",
+            "{}: is an image; render takes a scene (.json), an OpenVDB file (.vdb), a glTF model (.gltf, .glb) or a USD stage (.usd, .usda, .usdc, .usdz)",
             a.input.display()
         ))),
     }
@@ -212,6 +226,7 @@ fn render(
         goal: plan.goal,
         seed: described.sampling.seed,
         features: output::wants_features(described),
+        orders: described.film.order_layers(),
     };
     let from = keeper.map_or(Ok(None), Keeper::load)?;
     let save = |bytes: &[u8]| {

@@ -1,5 +1,6 @@
 //! Values on the command line and how they are read.
 
+use resolvent_scene::{Aov, nearest};
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -22,6 +23,21 @@ impl FromStr for Size {
         };
         Ok(Self([side(w)?, side(h)?]))
     }
+}
+
+/// A layer, as in scene files.
+pub fn layer(text: &str) -> Result<Aov, String> {
+    Aov::parse(text).ok_or_else(|| {
+        let known = Aov::NAMED.map(Aov::name);
+        match nearest(text, known) {
+            _ if text.starts_with("orders") => {
+                let most = Aov::MOST_ORDERS;
+                format!("expected orders:N with N from 0 to {most}, such as orders:4")
+            }
+            Some(near) => format!("there is no such layer; did you mean {near}?"),
+            None => format!("expected {} or orders:N", known.join(", ")),
+        }
+    })
 }
 
 /// `X0,Y0,X1,Y1`.

@@ -87,6 +87,7 @@ impl Stage {
             goal: Goal::Samples,
             seed: 7,
             features: true,
+            orders: 0,
         };
         let stop = AtomicBool::new(false);
         with_threads(threads, || {

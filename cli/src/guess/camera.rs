@@ -3,7 +3,7 @@
 use super::{Notes, numbers};
 use crate::args::{Render, Up};
 use crate::info::short;
-use resolvent_scene::{Camera, Pose};
+use resolvent_scene::{Camera, Pose, Projection};
 
 /// Where the camera stands, seen from the volume: degrees from the front to the right, and above the horizon.
 const AZIMUTH: f64 = 30.0;
@@ -178,7 +178,9 @@ pub fn frame(view: &View, points: &[V], what: &str, a: &Render, notes: &mut Note
     Shot {
         camera: Camera {
             pose: Pose::LookAt { origin, target, up },
-            fov_x_deg: fov,
+            projection: Projection::Perspective { fov_x_deg: fov },
+            shift: [0.0; 2],
+            exposure: 0.0,
             lens_radius: 0.0,
             focus_distance: 1.0,
         },

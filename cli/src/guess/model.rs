@@ -6,8 +6,8 @@ use crate::console;
 use crate::failure::{Outcome, input};
 use resolvent_gltf::Model;
 use resolvent_scene::{
-    Budget, Camera, Film, Geometry, IndexMap, Light, PluginBlock, Sampling, Scene, Shape, Source,
-    Transform, Units,
+    Budget, Camera, Film, Geometry, IndexMap, Light, PluginBlock, Projection, Sampling, Scene,
+    Shape, Source, Transform, Units,
 };
 use std::path::Path;
 
@@ -71,6 +71,7 @@ pub fn scene(path: &Path, a: &Render) -> Outcome<Scene> {
             emission: None,
             emission_texture: None,
             two_sided: false,
+            shaping: None,
             interior: None,
             priority: 0,
         }],
@@ -117,14 +118,16 @@ fn shot(
         |r| r.0,
     );
     let mut camera = own.camera.clone();
-    if own.aspect.is_none() {
-        // The field of view is that of a square picture, and the height is what glTF states.
-        let [w, h] = resolution.map(f64::from);
-        let half = (0.5 * camera.fov_x_deg).to_radians().tan() * w / h;
-        camera.fov_x_deg = 2.0 * half.atan().to_degrees();
-    }
-    if let Some(fov) = g.fov {
-        camera.fov_x_deg = fov.min(179.0);
+    if let Projection::Perspective { fov_x_deg } = &mut camera.projection {
+        if own.aspect.is_none() {
+            // The field of view is that of a square picture, and the height is what glTF states.
+            let [w, h] = resolution.map(f64::from);
+            let half = (0.5 * *fov_x_deg).to_radians().tan() * w / h;
+            *fov_x_deg = 2.0 * half.atan().to_degrees();
+        }
+        if let Some(fov) = g.fov {
+            *fov_x_deg = fov.min(179.0);
+        }
     }
     (camera, resolution)
 }

@@ -3,7 +3,7 @@
 use super::{Report, short};
 use crate::failure::{Outcome, input};
 use resolvent_gltf::Model;
-use resolvent_scene::{ImageSource, Light};
+use resolvent_scene::{ImageSource, Light, Projection};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -55,9 +55,13 @@ pub fn report(path: &Path) -> Outcome<Report> {
         row(
             "camera",
             format!(
-                "{}, {} degrees wide",
+                "{}, {}",
                 camera.name.escape_debug(),
-                short(camera.camera.fov_x_deg)
+                match camera.camera.projection {
+                    Projection::Perspective { fov_x_deg } =>
+                        format!("{} degrees wide", short(fov_x_deg)),
+                    Projection::Orthographic { width } => format!("{} units wide", short(width)),
+                }
             ),
         );
     }
@@ -79,7 +83,11 @@ pub fn report(path: &Path) -> Outcome<Report> {
         "textures": model.textures.iter().map(|(n, t)| json!({"name": n, "image": image(&t.image)})).collect::<Vec<_>>(),
         "media": model.media.keys().collect::<Vec<_>>(),
         "cameras": model.cameras.iter().map(|c| json!({
-            "name": c.name, "fov_x_deg": c.camera.fov_x_deg, "aspect": c.aspect,
+            "name": c.name, "aspect": c.aspect,
+            "fov_x_deg": match c.camera.projection {
+                Projection::Perspective { fov_x_deg } => Some(fov_x_deg),
+                Projection::Orthographic { .. } => None,
+            },
         })).collect::<Vec<Value>>(),
         "lights": model.lights.iter().map(kind).collect::<Vec<_>>(),
         "warnings": model.warnings,
@@ -91,6 +99,7 @@ fn image(source: &ImageSource) -> String {
     match source {
         ImageSource::File(file) => file.clone(),
         ImageSource::Memory(image) => format!("{}, {} bytes", image.name, image.bytes.len()),
+        ImageSource::White => "vertex colours".into(),
     }
 }
 

@@ -9,7 +9,7 @@ pub use scene::named_files;
 pub use vdb::short;
 
 use crate::args::Info;
-use crate::failure::{Code, Outcome};
+use crate::failure::{Code, Outcome, input};
 use crate::input::{Kind, kind};
 use serde_json::Value;
 
@@ -26,6 +26,12 @@ pub fn run(a: &Info) -> Outcome {
         Kind::Scene => scene::report(&a.file)?,
         Kind::Exr => exr::report(&a.file)?,
         Kind::Gltf => gltf::report(&a.file)?,
+        Kind::Usd => {
+            return Err(input(format!(
+                "{0}: is a USD stage; `resolvent convert {0} -o scene.json` makes a scene of it, which info describes",
+                a.file.display()
+            )));
+        }
     };
     if a.json {
         println!("{:#}", report.json);

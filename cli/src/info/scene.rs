@@ -9,6 +9,7 @@ use resolvent_scene::{
     Value,
 };
 use serde_json::json;
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -45,9 +46,14 @@ pub fn report(path: &Path) -> Outcome<Report> {
         row(
             "prototype",
             format!(
-                "{name} ({}), {} instances",
+                "{name} ({}), {} instances{}",
                 counted(&shapes),
-                copies.count()
+                copies.clone().count(),
+                if copies.clone().any(|i| i.transforms.is_some()) {
+                    " (tables count as one)"
+                } else {
+                    ""
+                }
             ),
         );
     }
@@ -178,9 +184,10 @@ fn plugins(scene: &Scene, registry: &Registry) -> Vec<Named> {
 /// The files that the scene names, as paths from the current folder, each once.
 pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
     let mut out = Vec::new();
+    let mut known = HashSet::new();
     let mut add = |file: &str| {
         let path = scene.resolve(file);
-        if !out.contains(&path) {
+        if known.insert(path.clone()) {
             out.push(path);
         }
     };
@@ -190,12 +197,19 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
         }
     }
     for t in scene.textures.values() {
-        if let ImageSource::File(file) = &t.image {
+        if let ImageSource::File(file) = &t.image
+            && !file.contains("<UDIM>")
+        {
             add(file);
         }
     }
     for s in scene.all_shapes() {
         if let Geometry::Ply { file, .. } | Geometry::Gltf { file, .. } = &s.geometry {
+            add(file);
+        }
+    }
+    for i in &scene.instances {
+        if let Some(file) = &i.transforms {
             add(file);
         }
     }

@@ -269,6 +269,9 @@ typedef struct resolvent_spectrum {
 /* The surface emits towards `wo`. */
 #define RESOLVENT_VERTEX_FLAGS_EMITS 4
 
+/* Of a camera whose rays are parallel: densities are per area across them, not per steradian. Since minor version 2. */
+#define RESOLVENT_VERTEX_FLAGS_PARALLEL 8
+
 /* No light, no medium. */
 #define RESOLVENT_NONE UINT32_MAX
 
@@ -343,6 +346,35 @@ typedef struct resolvent_param {
 /* A task of `resolvent_host.parallel_for`. */
 typedef void (*resolvent_task)(const void *data, size_t index);
 
+/* A right-handed orthonormal frame; `n` is the local z axis. */
+typedef struct resolvent_frame {
+  /* Local x axis. */
+  resolvent_float3 s;
+  /* Local y axis. */
+  resolvent_float3 t;
+  /* Local z axis. */
+  resolvent_float3 n;
+} resolvent_frame;
+
+/* A point on a surface, as a BSDF sees it. */
+typedef struct resolvent_surface_point {
+  /* Position. */
+  resolvent_float3 p;
+  /* Geometric normal, unit. */
+  resolvent_float3 ng;
+  /* Shading frame; `n` is the shading normal, `s` follows ∂p/∂u. */
+  struct resolvent_frame frame;
+  /* Texture coordinates. */
+  float uv[2];
+  /* Lanes in use. */
+  uint32_t lanes;
+  /* Index of refraction of what lies on the side that `ng` points to: 1 in vacuum, the outer medium's where dielectrics are
+   * nested. */
+  float outside_ior;
+  /* Linear colour and opacity that the mesh has here; white where it has none. Textures ask for it. Since minor version 2. */
+  float color[4];
+} resolvent_surface_point;
+
 /* Services of the host. */
 typedef struct resolvent_host {
   /* `sizeof(resolvent_host)`. */
@@ -361,6 +393,12 @@ typedef struct resolvent_host {
    * the texture coordinates `uv` to `out`: linear, clamped to the parameter's range, always finite. It takes no lock and
    * allocates nothing. Since minor version 1: there if `size` reaches it. */
   void (*texture)(void *ctx, const void *texture, const resolvent_float2 *uv, resolvent_float4 *out);
+  /* The same at a point of a surface: textures may depend on more of it than its texture coordinates (the colours of its mesh),
+   * which `resolvent_host.texture` takes for white. Since minor version 2: there if `size` reaches it. */
+  void (*texture_at)(void *ctx,
+                     const void *texture,
+                     const struct resolvent_surface_point *at,
+                     resolvent_float4 *out);
 } resolvent_host;
 
 /* What `create` is given. */
@@ -479,33 +517,6 @@ typedef struct resolvent_phase_table {
                               const struct resolvent_medium_point *at,
                               struct resolvent_closure *out);
 } resolvent_phase_table;
-
-/* A right-handed orthonormal frame; `n` is the local z axis. */
-typedef struct resolvent_frame {
-  /* Local x axis. */
-  resolvent_float3 s;
-  /* Local y axis. */
-  resolvent_float3 t;
-  /* Local z axis. */
-  resolvent_float3 n;
-} resolvent_frame;
-
-/* A point on a surface, as a BSDF sees it. */
-typedef struct resolvent_surface_point {
-  /* Position. */
-  resolvent_float3 p;
-  /* Geometric normal, unit. */
-  resolvent_float3 ng;
-  /* Shading frame; `n` is the shading normal, `s` follows ∂p/∂u. */
-  struct resolvent_frame frame;
-  /* Texture coordinates. */
-  float uv[2];
-  /* Lanes in use. */
-  uint32_t lanes;
-  /* Index of refraction of what lies on the side that `ng` points to: 1 in vacuum, the outer medium's where dielectrics are
-   * nested. */
-  float outside_ior;
-} resolvent_surface_point;
 
 /* Functions of a BSDF, see `RESOLVENT_BSDF_*`. */
 typedef struct resolvent_bsdf_table {
@@ -752,10 +763,11 @@ typedef struct resolvent_camera_ray {
   /* The interior media the camera is in: private to the host. */
   uint64_t inside;
   /* Density of the direction (sr⁻¹) under film positions of density 1 per pixel area, whatever the reconstruction filter:
-   * what weights between techniques are made of. */
+   * what weights between techniques are made of. Per area across the ray, and not per steradian, if `flags` have
+   * `RESOLVENT_VERTEX_FLAGS_PARALLEL`. */
   float density;
-  /* Zero. */
-  uint32_t reserved;
+  /* Bits of `RESOLVENT_VERTEX_FLAGS_*`: `PARALLEL`. */
+  uint32_t flags;
 } resolvent_camera_ray;
 
 /* A ray that leaves a light: the start of a light walk. The vertex it leaves from is filled beside it.
@@ -781,7 +793,8 @@ typedef struct resolvent_light_ray {
 
 /* A point on the lens as a vertex of the scene sees it. */
 typedef struct resolvent_sensor_sample {
-  /* What to connect to. `density` is that of `resolvent_camera_ray`: importance per steradian at the lens, 1 per pixel area. */
+  /* What to connect to. `density` is that of `resolvent_camera_ray`, as are the `PARALLEL` bit and what it means: importance per
+   * steradian at the lens, 1 per pixel area. */
   struct resolvent_light_sample target;
   /* Position on the film, pixels. */
   float film[2];
@@ -872,6 +885,12 @@ typedef struct resolvent_scene_table {
                                        const struct resolvent_vertex *light,
                                        const struct resolvent_vertex *to,
                                        resolvent_float2 *out);
+  /* Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
+   * lights that no ray can meet. Since minor version 2: there if `size` reaches it. */
+  resolvent_status (*radiance)(const void *ctx,
+                               const struct resolvent_vertex *light,
+                               const struct resolvent_vertex *to,
+                               resolvent_spectrum *out);
 } resolvent_scene_table;
 
 /* Features of a pixel sample beyond its radiance; filled if `resolvent_tile.features` asks for them. */
@@ -915,8 +934,9 @@ typedef struct resolvent_tile {
 typedef struct resolvent_output_table {
   /* `sizeof(resolvent_output_table)`. */
   uint32_t size;
-  /* Zero. */
-  uint32_t reserved;
+  /* How many layers of light by scattering order are wanted: layer k has the light scattered k times, the last one all that was
+   * scattered more often; 0: none. Since minor version 2, before which it was zero. */
+  uint32_t orders;
   /* Passed back to the functions. */
   void *ctx;
   /* Adds one sample of pixel (x, y). Samples of a pixel must come in order. */
@@ -924,6 +944,19 @@ typedef struct resolvent_output_table {
   /* Adds light to the film at position `film` (pixels), for walks that start at lights: every pixel receives it times the
    * value of its reconstruction filter there, divided by the number of samples of all pixels of the window together. */
   resolvent_status (*splat)(void *ctx, const resolvent_float2 *film, const resolvent_spectrum *radiance);
+  /* As `add`, with `layers`: the sample's radiance by scattering order, `orders` spectra that sum to it. Takes the place of `add`
+   * if `orders` is not 0. Since minor version 2: there if `size` reaches it. */
+  resolvent_status (*add_orders)(void *ctx,
+                                 uint32_t x,
+                                 uint32_t y,
+                                 const struct resolvent_pixel_sample *sample,
+                                 const resolvent_spectrum *layers);
+  /* As `splat`, for light that was scattered `order` times. Takes the place of `splat` if `orders` is not 0. Since minor
+   * version 2: there if `size` reaches it. */
+  resolvent_status (*splat_order)(void *ctx,
+                                  const resolvent_float2 *film,
+                                  const resolvent_spectrum *radiance,
+                                  uint32_t order);
 } resolvent_output_table;
 
 /* Functions of an integrator, see `Integrator`. */

@@ -301,6 +301,14 @@ pub struct HostTable {
         uv: *const [f32; 2],
         out: *mut [f32; 4],
     ),
+    /// The same at a point of a surface: textures may depend on more of it than its texture coordinates (the colours of its mesh),
+    /// which [`HostTable::texture`] takes for white. Since minor version 2: there if `size` reaches it.
+    pub texture_at: unsafe extern "C" fn(
+        ctx: *mut c_void,
+        texture: *const c_void,
+        at: *const SurfacePoint,
+        out: *mut [f32; 4],
+    ),
 }
 
 // SAFETY: the host's functions may be called from any thread.
@@ -554,6 +562,14 @@ pub struct SceneTable {
         to: *const Vertex,
         out: *mut [f32; 2],
     ) -> Status,
+    /// Radiance that the vertex `light`, on an emitting surface, sends towards `to`: 0 from a side that does not emit, and from
+    /// lights that no ray can meet. Since minor version 2: there if `size` reaches it.
+    pub radiance: unsafe extern "C" fn(
+        ctx: *const c_void,
+        light: *const Vertex,
+        to: *const Vertex,
+        out: *mut Spectrum,
+    ) -> Status,
 }
 
 /// Features of a pixel sample beyond its radiance; filled if [`Tile::features`] asks for them.
@@ -602,8 +618,9 @@ pub struct Tile {
 pub struct OutputTable {
     /// `size_of::<OutputTable>()`.
     pub size: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// How many layers of light by scattering order are wanted: layer k has the light scattered k times, the last one all that was
+    /// scattered more often; 0: none. Since minor version 2, before which it was zero.
+    pub orders: u32,
     /// Passed back to the functions.
     pub ctx: *mut c_void,
     /// Adds one sample of pixel (x, y). Samples of a pixel must come in order.
@@ -619,6 +636,23 @@ pub struct OutputTable {
         ctx: *mut c_void,
         film: *const [f32; 2],
         radiance: *const Spectrum,
+    ) -> Status,
+    /// As `add`, with `layers`: the sample's radiance by scattering order, `orders` spectra that sum to it. Takes the place of `add`
+    /// if `orders` is not 0. Since minor version 2: there if `size` reaches it.
+    pub add_orders: unsafe extern "C" fn(
+        ctx: *mut c_void,
+        x: u32,
+        y: u32,
+        sample: *const PixelSample,
+        layers: *const Spectrum,
+    ) -> Status,
+    /// As `splat`, for light that was scattered `order` times. Takes the place of `splat` if `orders` is not 0. Since minor
+    /// version 2: there if `size` reaches it.
+    pub splat_order: unsafe extern "C" fn(
+        ctx: *mut c_void,
+        film: *const [f32; 2],
+        radiance: *const Spectrum,
+        order: u32,
     ) -> Status,
 }
 

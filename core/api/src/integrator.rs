@@ -201,6 +201,15 @@ impl<'a> SceneView<'a> {
         Ok(out)
     }
 
+    /// Radiance that `light`, a vertex on an emitting surface, sends towards `to`.
+    #[inline(always)]
+    pub fn radiance(&self, light: &Vertex, to: &Vertex) -> Outcome<Spectrum> {
+        let mut out = Spectrum::ZERO;
+        // SAFETY: as above.
+        found(unsafe { (self.table.radiance)(self.table.ctx, light, to, &mut out) })?;
+        Ok(out)
+    }
+
     /// Approximate transmittance towards a light, visibility not tested.
     #[inline(always)]
     pub fn approximate(&self, from: &Vertex, to: &LightSample) -> Outcome<Spectrum> {
@@ -261,5 +270,44 @@ impl<'a> Output<'a> {
     pub fn splat(&mut self, film: [f32; 2], radiance: Spectrum) -> Outcome<()> {
         // SAFETY: as above.
         found(unsafe { (self.table.splat)(self.table.ctx, &film, &radiance) }).map(|_| ())
+    }
+
+    /// How many layers of light by scattering order are wanted: layer k has the light scattered k times, the last one all that
+    /// was scattered more often; 0: none.
+    pub fn orders(&self) -> usize {
+        let complete = self.table.size as usize >= size_of::<OutputTable>();
+        if complete {
+            self.table.orders as usize
+        } else {
+            0
+        }
+    }
+
+    /// As [`Output::add`], with the radiance by scattering order. Takes its place if [`Output::orders`] is not 0.
+    ///
+    /// # Panics
+    /// If there are not as many layers as are wanted.
+    pub fn add_orders(
+        &mut self,
+        x: u32,
+        y: u32,
+        sample: &PixelSample,
+        layers: &[Spectrum],
+    ) -> Outcome<()> {
+        assert_eq!(layers.len(), self.orders(), "layers of scattering orders");
+        let ctx = self.table.ctx;
+        // SAFETY: as above; the table reaches this function, since it wants layers, of which there are enough.
+        found(unsafe { (self.table.add_orders)(ctx, x, y, sample, layers.as_ptr()) }).map(|_| ())
+    }
+
+    /// As [`Output::splat`], for light that was scattered `order` times. Takes its place if [`Output::orders`] is not 0.
+    ///
+    /// # Panics
+    /// If no layers are wanted.
+    pub fn splat_order(&mut self, film: [f32; 2], radiance: Spectrum, order: u32) -> Outcome<()> {
+        assert_ne!(self.orders(), 0, "layers of scattering orders");
+        let ctx = self.table.ctx;
+        // SAFETY: as above; the table reaches this function, since it wants layers.
+        found(unsafe { (self.table.splat_order)(ctx, &film, &radiance, order) }).map(|_| ())
     }
 }

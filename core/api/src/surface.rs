@@ -21,6 +21,8 @@ pub struct SurfacePoint {
     /// Index of refraction of what lies on the side that `ng` points to: 1 in vacuum, the outer medium's where dielectrics are
     /// nested.
     pub outside_ior: f32,
+    /// Linear colour and opacity that the mesh has here; white where it has none. Textures ask for it. Since minor version 2.
+    pub color: [f32; 4],
 }
 
 /// A point at the origin in vacuum, its normal along z.
@@ -34,6 +36,7 @@ impl Default for SurfacePoint {
             uv: [0.0; 2],
             lanes: 3,
             outside_ior: 1.0,
+            color: [1.0; 4],
         }
     }
 }

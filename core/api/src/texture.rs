@@ -9,6 +9,7 @@ use crate::params::{Error, Params};
 use crate::spectrum::Spectrum;
 use crate::surface::SurfacePoint;
 use core::ffi::c_void;
+use core::mem::offset_of;
 
 /// What a texture's four numbers (red, green, blue, alpha) become.
 pub trait FromTexel: Copy {
@@ -46,14 +47,9 @@ unsafe impl Send for TextureRef {}
 unsafe impl Sync for TextureRef {}
 
 impl TextureRef {
-    /// # Safety
-    /// `host` must be the host's table, and `value` one of its values of the kind [`ParamKind::Texture`].
-    unsafe fn new(value: &ParamValue, host: *const HostTable) -> Result<Self, Error> {
-        // Hosts of an older minor version end before it.
-        let end = core::mem::offset_of!(HostTable, texture) + size_of::<usize>();
-        // SAFETY: by contract.
-        let known = unsafe { (*host).size as usize >= end };
-        if !known || value.instance.is_null() {
+    /// `host` is the host's table, and `value` one of its values of the kind [`ParamKind::Texture`].
+    fn new(value: &ParamValue, host: *const HostTable) -> Result<Self, Error> {
+        if value.instance.is_null() {
             return Err(Error::new("the host gives a texture that it cannot read"));
         }
         Ok(Self {
@@ -62,12 +58,20 @@ impl TextureRef {
         })
     }
 
-    /// Red, green, blue and alpha at texture coordinates.
+    /// Red, green, blue and alpha at a point.
     #[inline]
-    pub fn texel(&self, uv: [f32; 2]) -> [f32; 4] {
+    pub fn texel(&self, at: &SurfacePoint) -> [f32; 4] {
         let mut out = [0.0; 4];
-        // SAFETY: handle and table are valid by the contract of `new`.
-        unsafe { ((*self.host).texture)((*self.host).ctx, self.handle, &uv, &mut out) };
+        // SAFETY: handle and table come from the host under the contract of `Params::new`; what a host of an older minor version
+        // lacks is not touched.
+        unsafe {
+            let ctx = (*self.host).ctx;
+            if (*self.host).size as usize > offset_of!(HostTable, texture_at) {
+                ((*self.host).texture_at)(ctx, self.handle, at, &mut out);
+            } else {
+                ((*self.host).texture)(ctx, self.handle, &at.uv, &mut out);
+            }
+        }
         out
     }
 }
@@ -92,7 +96,7 @@ impl<T: FromTexel> Textured<T> {
     pub fn at(&self, at: &SurfacePoint) -> T {
         match self {
             Self::Constant(value) => *value,
-            Self::Image(texture) => T::from_texel(texture.texel(at.uv)),
+            Self::Image(texture) => T::from_texel(texture.texel(at)),
         }
     }
 
@@ -115,8 +119,7 @@ impl Params<'_> {
         let Some(value) = self.find(name, ParamKind::Texture) else {
             return Ok(None);
         };
-        // SAFETY: value and table come from the host under the contract of `Params::new`.
-        unsafe { TextureRef::new(value, self.host_table()) }.map(Some)
+        TextureRef::new(value, self.host_table()).map(Some)
     }
 
     /// A number that may be textured.

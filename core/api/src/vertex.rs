@@ -33,6 +33,8 @@ pub mod vertex_flags {
     pub const DELTA: u32 = 2;
     /// The surface emits towards `wo`.
     pub const EMITS: u32 = 4;
+    /// Of a camera whose rays are parallel: densities are per area across them, not per steradian. Since minor version 2.
+    pub const PARALLEL: u32 = 8;
 }
 
 /// No light, no medium.
@@ -194,10 +196,11 @@ pub struct CameraRay {
     /// The interior media the camera is in: private to the host.
     pub inside: u64,
     /// Density of the direction (sr⁻¹) under film positions of density 1 per pixel area, whatever the reconstruction filter:
-    /// what weights between techniques are made of.
+    /// what weights between techniques are made of. Per area across the ray, and not per steradian, if `flags` have
+    /// [`vertex_flags::PARALLEL`].
     pub density: f32,
-    /// Zero.
-    pub reserved: u32,
+    /// Bits of [`vertex_flags`]: `PARALLEL`.
+    pub flags: u32,
 }
 
 /// A ray that leaves a light: the start of a light walk. The vertex it leaves from is filled beside it.
@@ -227,7 +230,8 @@ pub struct LightRay {
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct SensorSample {
-    /// What to connect to. `density` is that of [`CameraRay`]: importance per steradian at the lens, 1 per pixel area.
+    /// What to connect to. `density` is that of [`CameraRay`], as are the `PARALLEL` bit and what it means: importance per
+    /// steradian at the lens, 1 per pixel area.
     pub target: LightSample,
     /// Position on the film, pixels.
     pub film: [f32; 2],

@@ -212,6 +212,17 @@ unsafe extern "C" fn coordinates(
     unsafe { *out = [(*uv)[0], (*uv)[1], 0.0, 1.0] };
 }
 
+/// The same, asked with a point.
+unsafe extern "C" fn coordinates_at(
+    ctx: *mut c_void,
+    texture: *const c_void,
+    at: *const resolvent_api::SurfacePoint,
+    out: *mut [f32; 4],
+) {
+    // SAFETY: as above.
+    unsafe { coordinates(ctx, texture, &(*at).uv, out) };
+}
+
 static HOST: HostTable = HostTable {
     size: size_of::<HostTable>() as u32,
     abi_minor: resolvent_api::abi::ABI_MINOR,
@@ -220,6 +231,7 @@ static HOST: HostTable = HostTable {
     fail: ignore_fail,
     parallel_for: one_by_one,
     texture: coordinates,
+    texture_at: coordinates_at,
 };
 
 #[cfg(test)]

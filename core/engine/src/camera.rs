@@ -1,48 +1,58 @@
-//! Cameras: pinhole and thin lens.
+//! Cameras: pinhole, thin lens and parallel rays.
 
 use crate::filter::Filter;
 use resolvent_api::Spectrum;
 use resolvent_api::math::{Affine, DVec3, Vec3, warp};
 use resolvent_api::vertex::{CameraRay, LightSample, NONE, SensorSample, Vertex, vertex_flags};
+use resolvent_scene as describe;
+use resolvent_scene::Projection;
 
-/// A perspective camera.
+/// A camera.
 pub struct Camera {
-    /// Lens centre.
+    /// Lens centre; of parallel rays a point of the plane that they start from.
     origin: Vec3,
     /// Right, up and forward, unit length.
     axes: [Vec3; 3],
-    /// Film coordinates (pixels) to the plane at distance 1: scale and offset of x and y.
-    scale: f32,
+    /// Edges of a pixel on the plane at distance 1, or of a pixel if rays are parallel.
+    scale: [f32; 2],
+    /// Where the axis meets the film, and the film's size, pixels.
     centre: [f32; 2],
+    size: [f32; 2],
+    parallel: bool,
     lens_radius: f32,
     focus_distance: f32,
+    exposure: f32,
     filter: Filter,
     /// The interior media the camera is in.
     pub inside: u64,
 }
 
 impl Camera {
-    /// A camera with the pose `to_world` (looks along −z, y up), the full horizontal field of view `fov_x_deg` over `width`
-    /// square pixels, and a lens of radius 0 (pinhole) or more.
-    pub fn new(
-        to_world: &Affine,
-        fov_x_deg: f64,
-        resolution: [u32; 2],
-        lens_radius: f64,
-        focus_distance: f64,
-        filter: Filter,
-    ) -> Self {
+    /// The camera `c` with the pose `to_world` (looks along −z, y up) before `film`.
+    pub fn new(to_world: &Affine, c: &describe::Camera, film: &describe::Film) -> Self {
         let axis = |v: DVec3| to_world.vector(v).normalize().as_vec3();
-        let half = (0.5 * fov_x_deg).to_radians().tan();
-        let [w, h] = resolution.map(f64::from);
+        let [w, h] = film.resolution.map(f64::from);
+        let (width, parallel) = match c.projection {
+            Projection::Perspective { fov_x_deg } => {
+                (2.0 * (0.5 * fov_x_deg).to_radians().tan(), false)
+            }
+            Projection::Orthographic { width } => (width, true),
+        };
+        let x = width / w;
         Self {
             origin: to_world.translation.as_vec3(),
             axes: [axis(DVec3::X), axis(DVec3::Y), axis(DVec3::NEG_Z)],
-            scale: (2.0 * half / w) as f32,
-            centre: [(0.5 * w) as f32, (0.5 * h) as f32],
-            lens_radius: lens_radius as f32,
-            focus_distance: focus_distance as f32,
-            filter,
+            scale: [x as f32, (x / film.pixel_aspect) as f32],
+            centre: [
+                ((0.5 - c.shift[0]) * w) as f32,
+                ((0.5 + c.shift[1]) * h) as f32,
+            ],
+            size: [w as f32, h as f32],
+            parallel,
+            lens_radius: if parallel { 0.0 } else { c.lens_radius as f32 },
+            focus_distance: c.focus_distance as f32,
+            exposure: c.exposure.exp2() as f32,
+            filter: Filter::new(film.filter),
             inside: 0,
         }
     }
@@ -50,6 +60,11 @@ impl Camera {
     /// Centre of the lens.
     pub fn origin(&self) -> Vec3 {
         self.origin
+    }
+
+    /// The factor on the picture.
+    pub fn exposure(&self) -> f32 {
+        self.exposure
     }
 
     /// The reconstruction filter.
@@ -68,10 +83,20 @@ impl Camera {
     /// The ray through the position `film` (pixels) and the point on the lens chosen by `lens`.
     #[inline]
     pub fn film_ray(&self, film: [f32; 2], lens: [f32; 2]) -> CameraRay {
-        let x = (film[0] - self.centre[0]) * self.scale;
-        let y = (self.centre[1] - film[1]) * self.scale;
+        let x = (film[0] - self.centre[0]) * self.scale[0];
+        let y = (self.centre[1] - film[1]) * self.scale[1];
         let [right, up, forward] = self.axes;
         let mut o = self.origin;
+        if self.parallel {
+            return CameraRay {
+                o: (o + right * x + up * y).into(),
+                d: forward.into(),
+                weight: 1.0,
+                inside: self.inside,
+                density: self.density(1.0),
+                flags: vertex_flags::PARALLEL,
+            };
+        }
         let mut d = forward + right * x + up * y;
         if self.lens_radius > 0.0 {
             let focus = o + d * self.focus_distance;
@@ -85,14 +110,15 @@ impl Camera {
             weight: 1.0,
             inside: self.inside,
             density: self.density(forward.dot(d)),
-            reserved: 0,
+            flags: 0,
         }
     }
 
     /// Density (sr⁻¹) of a direction at the angle of `cosine` to the axis, from any point of the lens, for film positions of
-    /// density 1 per pixel area: dA = dω/(s² cos³ θ), s the edge of a pixel on the plane at distance 1.
+    /// density 1 per pixel area: dA = dω/(a cos³ θ), a the area of a pixel on the plane at distance 1. Of parallel rays the density
+    /// per area, for `cosine` = 1.
     fn density(&self, cosine: f32) -> f32 {
-        1.0 / (self.scale * self.scale * cosine * cosine * cosine)
+        1.0 / (self.scale[0] * self.scale[1] * cosine * cosine * cosine)
     }
 
     fn lens_point(&self, u: [f32; 2]) -> Vec3 {
@@ -107,18 +133,26 @@ impl Camera {
     /// The point on the lens chosen by `lens`, and the place on the film where `reference` appears through it; `None` if it
     /// is at infinity, behind the camera or beside the film.
     pub fn sense(&self, reference: &Vertex, lens: [f32; 2]) -> Option<SensorSample> {
-        let o = self.lens_point(lens);
         if reference.is_infinite() {
             return None;
+        }
+        let [right, up, forward] = self.axes;
+        let mut o = self.lens_point(lens);
+        if self.parallel {
+            let to = reference.position() - o;
+            o += to - forward * forward.dot(to);
         }
         let to = reference.position() - o;
         let distance = to.length();
         if !(distance > 0.0) {
             return None;
         }
-        let d = to / distance;
-        let [right, up, forward] = self.axes;
-        let cosine = forward.dot(d);
+        let d = if self.parallel {
+            forward
+        } else {
+            to / distance
+        };
+        let cosine = forward.dot(to / distance);
         if !(cosine > 0.0) {
             return None;
         }
@@ -128,13 +162,12 @@ impl Camera {
             1.0
         };
         let on_plane = (o - self.origin) + d * (plane / cosine);
-        let per_pixel = self.scale * plane;
         let film = [
-            self.centre[0] + right.dot(on_plane) / per_pixel,
-            self.centre[1] - up.dot(on_plane) / per_pixel,
+            self.centre[0] + right.dot(on_plane) / (self.scale[0] * plane),
+            self.centre[1] - up.dot(on_plane) / (self.scale[1] * plane),
         ];
         let margin = self.filter.radius();
-        let on_film = |i: usize| film[i] > -margin && film[i] < 2.0 * self.centre[i] + margin;
+        let on_film = |i: usize| film[i] > -margin && film[i] < self.size[i] + margin;
         if !(on_film(0) && on_film(1)) {
             return None;
         }
@@ -143,9 +176,13 @@ impl Camera {
                 wi: (-d).into(),
                 distance,
                 radiance: Spectrum::ONE,
-                density: self.density(cosine),
+                density: self.density(if self.parallel { 1.0 } else { cosine }),
                 light: NONE,
-                flags: vertex_flags::DELTA,
+                flags: if self.parallel {
+                    vertex_flags::DELTA | vertex_flags::PARALLEL
+                } else {
+                    vertex_flags::DELTA
+                },
                 p: o.into(),
                 ng: [0.0; 3],
                 primitive: [NONE; 2],
@@ -159,18 +196,37 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use resolvent_scene::{Film, Pose, Transform};
+
+    fn camera(
+        projection: Projection,
+        resolution: [u32; 2],
+        change: impl FnOnce(&mut describe::Camera, &mut Film),
+    ) -> Camera {
+        let mut c = describe::Camera {
+            pose: Pose::Transform(Transform::IDENTITY),
+            projection,
+            lens_radius: 0.0,
+            focus_distance: 1.0,
+            shift: [0.0; 2],
+            exposure: 0.0,
+        };
+        let mut film = Film {
+            resolution,
+            ..Film::default()
+        };
+        change(&mut c, &mut film);
+        Camera::new(&Affine::IDENTITY, &c, &film)
+    }
+
+    fn perspective(fov_x_deg: f64) -> Projection {
+        Projection::Perspective { fov_x_deg }
+    }
 
     #[test]
     fn edges_of_the_film_span_the_field_of_view() {
         for fov in [1e-4, 44.0, 179.0, 179.9] {
-            let c = Camera::new(
-                &Affine::IDENTITY,
-                fov,
-                [200, 100],
-                0.0,
-                1.0,
-                Filter::Box(0.5),
-            );
+            let c = camera(perspective(fov), [200, 100], |_, _| ());
             let left = Vec3::from(c.ray([0, 49], [0.0, 1.0], [0.5; 2]).d).as_dvec3();
             let angle = left.x.abs().atan2(-left.z).to_degrees();
             assert!(
@@ -182,12 +238,35 @@ mod tests {
         }
     }
 
-    /// A point on a camera ray appears where the ray came from, and the directions' densities integrate to the film's area.
+    /// A shift moves the window on the plane at distance 1 by shares of its width and height; high pixels show more of it.
+    #[test]
+    fn a_shifted_window_with_oblong_pixels() {
+        let c = camera(perspective(90.0), [200, 100], |c, film| {
+            c.shift = [0.25, -0.5];
+            film.pixel_aspect = 0.5;
+        });
+        // The window is 2 wide and 100 pixels of 0.02 high, and its middle is at (0.5, −1).
+        for (film, x, y) in [([0.0, 0.0], -0.5, 0.0), ([200.0, 100.0], 1.5, -2.0)] {
+            let d = Vec3::from(c.film_ray(film, [0.5; 2]).d);
+            assert!((d.x / -d.z - x).abs() < 1e-5, "{d}");
+            assert!((d.y / -d.z - y).abs() < 1e-5, "{d}");
+        }
+    }
+
+    /// A point on a camera ray appears where the ray came from, with the same density.
     #[test]
     fn points_appear_where_rays_come_from() {
-        for lens_radius in [0.0, 0.2] {
-            let film = Filter::Box(0.5);
-            let c = Camera::new(&Affine::IDENTITY, 70.0, [64, 32], lens_radius, 3.0, film);
+        let orthographic = Projection::Orthographic { width: 5.0 };
+        for (projection, lens_radius) in [
+            (perspective(70.0), 0.0),
+            (perspective(70.0), 0.2),
+            (orthographic, 0.0),
+        ] {
+            let c = camera(projection, [64, 32], |c, film| {
+                (c.lens_radius, c.focus_distance) = (lens_radius, 3.0);
+                c.shift = [0.1, 0.3];
+                film.pixel_aspect = 1.5;
+            });
             for (at, lens) in [
                 ([0.25, 0.75], [0.3, 0.9]),
                 ([63.5, 20.0], [0.1, 0.2]),
@@ -202,18 +281,19 @@ mod tests {
                         assert!((s.film[i] - at[i]).abs() < 1e-3, "{at:?} {:?}", s.film);
                     }
                     assert!((s.target.density / r.density - 1.0).abs() < 1e-5);
+                    assert!((s.target.distance / distance - 1.0).abs() < 1e-4);
                 }
+                v.p = (Vec3::from(r.o) - Vec3::from(r.d)).into();
+                assert!(c.sense(&v, lens).is_none(), "behind the camera");
             }
         }
-        // ∫ density dω over the film by midpoints on the plane at distance 1: dω = cos³ dA.
-        let c = Camera::new(
-            &Affine::IDENTITY,
-            90.0,
-            [40, 20],
-            0.0,
-            1.0,
-            Filter::Box(0.5),
-        );
+    }
+
+    /// ∫ density dω over the film by midpoints on the plane at distance 1, dω = cos³ dA, is the film's area; so is the density of
+    /// parallel rays times the area that they cover.
+    #[test]
+    fn densities_integrate_to_the_area_of_the_film() {
+        let c = camera(perspective(90.0), [40, 20], |_, _| ());
         let n = 200;
         let mut sum = 0f64;
         for i in 0..n * n {
@@ -223,18 +303,23 @@ mod tests {
             sum += f64::from(c.density(cosine as f32)) * cosine.powi(3) * 2.0 / f64::from(n * n);
         }
         assert!((sum / 800.0 - 1.0).abs() < 1e-5, "{sum}");
+        let c = camera(
+            Projection::Orthographic { width: 3.0 },
+            [40, 20],
+            |_, film| {
+                film.pixel_aspect = 2.0;
+            },
+        );
+        // Pixels half as high as they are wide: 3 by 0.75.
+        let area = 3.0 * 0.75 * c.film_ray([3.0, 4.0], [0.5; 2]).density;
+        assert!((area / 800.0 - 1.0).abs() < 1e-5, "{area}");
     }
 
     #[test]
     fn a_lens_keeps_the_focal_plane_sharp() {
-        let c = Camera::new(
-            &Affine::IDENTITY,
-            60.0,
-            [10, 10],
-            0.3,
-            4.0,
-            Filter::Box(0.5),
-        );
+        let c = camera(perspective(60.0), [10, 10], |c, _| {
+            (c.lens_radius, c.focus_distance) = (0.3, 4.0);
+        });
         let at = |lens| {
             let r = c.ray([2, 7], [0.0, 0.0], lens);
             let (o, d) = (Vec3::from(r.o), Vec3::from(r.d));

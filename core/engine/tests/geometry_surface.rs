@@ -242,6 +242,7 @@ fn frames() {
         ],
         uvs: vec![vec2(0.0, 0.0), vec2(0.0, 2.0), vec2(1.0, 0.0)],
         indices: vec![[0, 1, 2]],
+        ..TriangleMesh::default()
     };
     let ray = Ray::new(vec3(1.0, 0.5, 5.0), -Vec3::Z);
     let accel = one(Shape::Mesh(mesh.clone()));
@@ -278,10 +279,35 @@ fn frames() {
     let useless = one(Shape::Mesh(TriangleMesh {
         uvs: vec![Vec2::ONE; 3],
         normals: vec![Vec3::ZERO; 3],
-        ..mesh
+        ..mesh.clone()
     }));
     let at = useless.interaction(&useless.closest(&ray).unwrap(), &ray);
     assert!(at.dpdu.length() > 0.5 && at.dpdu.dot(at.ng).abs() < 1e-6 && at.ns == at.ng);
+
+    // Colours are interpolated, and so are tangents, which count before coordinates; shapes without colours are white.
+    let plain = TriangleMesh {
+        uvs: vec![],
+        ..mesh.clone()
+    };
+    assert_eq!(at.color, [1.0; 4]);
+    assert!(!accel.uv_mirrored(0, 0));
+    let painted = one(Shape::Mesh(TriangleMesh {
+        colors: vec![
+            [1.0, 0.0, 0.0, 1.0],
+            [0.0, 1.0, 0.0, 0.0],
+            [0.0, 0.0, 4.0, 1.0],
+        ],
+        tangents: vec![
+            [0.0, 1.0, 0.0, -1.0],
+            [0.0, 3.0, 0.0, -1.0],
+            [4.0, 0.0, 0.0, -1.0],
+        ],
+        ..plain
+    }));
+    let at = painted.interaction(&painted.closest(&ray).unwrap(), &ray);
+    assert_eq!(at.color, [0.5, 0.25, 1.0, 0.75]);
+    assert!((at.dpdu - vec3(1.0, 1.25, 0.0)).length() < 1e-6, "{at:?}");
+    assert!(painted.uv_mirrored(0, 0));
 
     let quad = Quad {
         corner: vec3(1.0, 1.0, 0.0),

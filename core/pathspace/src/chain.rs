@@ -1,8 +1,9 @@
 //! A Markov chain in the space of primary samples (Kelemen et al. 2002).
 //!
 //! Numbers are made when they are asked for, and brought up to date when they are asked for again: a large step draws all of
-//! them anew, a small step moves each a little around the torus. Keys of streams, and the lane that leads, change with large
-//! steps alone, so that small steps move a flight's distance smoothly while its tail stays.
+//! them anew, a small step moves each a little around the torus: by how much is drawn for each step, since what is narrow and what is
+//! wide want different ones. Keys of streams, and the lane that leads, change with large steps alone, so that small steps move a
+//! flight's distance smoothly while its tail stays.
 
 use crate::bidirectional::{Draws, End};
 use crate::sampler::Purpose;
@@ -15,6 +16,17 @@ struct Entry {
     key: u64,
     /// Step at which the value was last brought up to date; 0: never.
     time: u64,
+    /// What [`Chain::moved`] was then.
+    moved: f64,
+}
+
+/// Standard deviations of small steps, of the unit interval: each step's is drawn between the two, uniformly in the logarithm.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes {
+    /// Smallest.
+    pub least: f32,
+    /// Largest.
+    pub most: f32,
 }
 
 /// The chain.
@@ -25,7 +37,10 @@ pub struct Chain {
     changed: Vec<(u32, Entry)>,
     hero: (u32, u32),
     lanes: u32,
-    sigma: f32,
+    sizes: Sizes,
+    /// Variance of all small steps since the last large one, and before the step in progress.
+    moved: f64,
+    moved_before: f64,
     step: u64,
     last_large: u64,
     /// The last large step before the one in progress.
@@ -34,15 +49,17 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// A chain whose small steps have the standard deviation `sigma`.
-    pub fn new(sigma: f32, lanes: u32) -> Self {
+    /// A chain with small steps of these sizes.
+    pub fn new(sizes: Sizes, lanes: u32) -> Self {
         Self {
             numbers: Stream::new(0),
             entries: Vec::new(),
             changed: Vec::new(),
             hero: (0, 0),
             lanes,
-            sigma,
+            sizes,
+            moved: 0.0,
+            moved_before: 0.0,
             step: 0,
             last_large: 0,
             large_before: 0,
@@ -56,6 +73,8 @@ impl Chain {
         self.entries.clear();
         self.changed.clear();
         self.step = 1;
+        self.moved = 0.0;
+        self.moved_before = 0.0;
         self.last_large = 1;
         self.large_before = 1;
         self.is_large = true;
@@ -77,10 +96,16 @@ impl Chain {
         self.step += 1;
         self.is_large = large;
         self.large_before = self.last_large;
+        self.moved_before = self.moved;
         self.hero.1 = self.hero.0;
         if large {
             self.last_large = self.step;
+            self.moved = 0.0;
             self.hero.0 = self.draw_hero();
+        } else {
+            let Sizes { least, most } = self.sizes;
+            let sigma = least * (most / least).powf(self.numbers.uniform());
+            self.moved += f64::from(sigma).powi(2);
         }
     }
 
@@ -96,6 +121,7 @@ impl Chain {
         }
         self.hero.0 = self.hero.1;
         self.last_large = self.large_before;
+        self.moved = self.moved_before;
         self.step -= 1;
     }
 
@@ -115,11 +141,11 @@ impl Chain {
             // First the state before the step: what it becomes must not depend on whether the step is kept, or numbers would be
             // drawn until they please.
             self.renew(&mut new);
-            self.drift(&mut new, self.step - 1);
+            self.drift(&mut new, self.step - 1, self.moved_before);
         }
         self.changed.push((i as u32, new));
         self.renew(&mut new);
-        self.drift(&mut new, self.step);
+        self.drift(&mut new, self.step, self.moved);
         self.entries[i] = new;
         new
     }
@@ -131,18 +157,19 @@ impl Chain {
             e.value = [a[0], a[1], b[0], b[1]];
             e.key = self.numbers.bits();
             e.time = self.last_large;
+            e.moved = 0.0;
         }
     }
 
     /// Moves an entry by the small steps it has missed; they add up to one of their joint variance.
-    fn drift(&mut self, e: &mut Entry, step: u64) {
-        let missed = step.saturating_sub(e.time);
-        if missed > 0 {
-            let spread = self.sigma * (missed as f32).sqrt();
+    fn drift(&mut self, e: &mut Entry, step: u64, moved: f64) {
+        if step > e.time {
+            let spread = (moved - e.moved).max(0.0).sqrt() as f32;
             for v in &mut e.value {
                 *v = around(*v + spread * normal(&mut self.numbers));
             }
             e.time = step;
+            e.moved = moved;
         }
     }
 }
@@ -182,6 +209,10 @@ impl Draws for Chain {
 mod tests {
     use super::*;
 
+    fn sizes(least: f32, most: f32) -> Sizes {
+        Sizes { least, most }
+    }
+
     fn state(c: &mut Chain) -> Vec<[f32; 4]> {
         (0..5)
             .map(|b| c.four(End::Light, b, Purpose::Flight))
@@ -192,7 +223,7 @@ mod tests {
     /// accepted. The chain visits two kinds of states, one blind to the number, with a density of 1 + cos 2πx in the other.
     #[test]
     fn late_numbers_are_not_chosen() {
-        let mut c = Chain::new(0.1, 1);
+        let mut c = Chain::new(sizes(0.02, 0.3), 1);
         let density = |c: &mut Chain| {
             let kind = c.four(End::Sensor, 0, Purpose::Branch)[0];
             if kind < 0.5 {
@@ -236,7 +267,7 @@ mod tests {
 
     #[test]
     fn rejection_restores_everything() {
-        let mut c = Chain::new(0.02, 3);
+        let mut c = Chain::new(sizes(0.02, 0.02), 3);
         c.start(5);
         let before = state(&mut c);
         let key = c.key(End::Light, 2, Purpose::Flight);
@@ -260,7 +291,7 @@ mod tests {
     /// that is asked for now and then.
     #[test]
     fn states_stay_uniform() {
-        let mut c = Chain::new(0.05, 3);
+        let mut c = Chain::new(sizes(0.01, 0.2), 3);
         c.start(11);
         let n = 400_000;
         let mut sums = [[0f64; 2]; 2];

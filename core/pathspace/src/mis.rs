@@ -137,6 +137,17 @@ pub enum Heuristic {
     Alone,
 }
 
+/// What weights take for the densities of the media between two vertices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MediaDensities {
+    /// Those of the null collisions that came about (Miller et al. 2019): exact over all strategies and lanes, and as random as
+    /// they are.
+    Exact,
+    /// Those of flights and connections through a deterministic, approximate optical depth: smooth. Each strategy then is divided by
+    /// its own exact density, and weighed by these.
+    Depth,
+}
+
 /// The densities of a whole path x_0 … x_n, x_0 on a light and x_n on the sensor, under all strategies: strategy s takes
 /// x_0 … x_{s−1} from a walk that starts at a light, the others from one that starts at the sensor, and connects the two.
 ///
@@ -182,6 +193,14 @@ impl Strategies {
     /// Number of edges.
     fn edges(&self) -> usize {
         self.rho.len()
+    }
+
+    /// True if strategy `k` may give the path light: nothing is connected to what was turned by a delta lobe, and its walks find
+    /// every vertex.
+    pub fn can(&self, k: usize) -> bool {
+        let walked = self.from_light.iter().take(if k > 1 { k } else { 0 });
+        let seen = self.from_sensor[..self.edges()].iter().skip(k);
+        self.extra(k) > 0.0 && walked.chain(seen).all(|p| *p > 0.0)
     }
 
     /// What strategy `k` has beside the products of L and S: 0 if it cannot be.
@@ -230,10 +249,9 @@ impl Strategies {
         }
     }
 
-    /// The weight of strategy `s` by the balance heuristic, for lane densities as in [`Strategies::divisor`].
-    pub fn weight(&self, s: usize, track: Spectrum, lanes: u32) -> f64 {
-        self.divisor(s, track, lanes, Heuristic::Alone)
-            / self.divisor(s, track, lanes, Heuristic::Balance)
+    /// The weight of strategy `s`, for lane densities as in [`Strategies::divisor`].
+    pub fn weight(&self, s: usize, track: Spectrum, lanes: u32, heuristic: Heuristic) -> f64 {
+        self.divisor(s, track, lanes, Heuristic::Alone) / self.divisor(s, track, lanes, heuristic)
     }
 
     /// What strategy `s` divides contribution over its own grey density by, for a path whose walks and connection have the

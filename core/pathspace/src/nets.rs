@@ -89,7 +89,7 @@ mod tests {
             (begin, number_of, last) = (net.end, number_of + 1, size);
         }
         assert_eq!(last, POINTS);
-        let count = |n| number(n - 1) + 1;
+        let count = |n: u32| number(n - 1) + 1;
         assert_eq!([64, 256, 1024].map(count), [4, 10, 22]);
     }
 }

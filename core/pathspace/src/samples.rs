@@ -1,5 +1,6 @@
 //! The samples of a piece of work, in the order in which the film wants them.
 
+use crate::orders::Tally;
 use resolvent_api::Output;
 use resolvent_api::abi::{PixelSample, Tile};
 use resolvent_api::integrator::Outcome;
@@ -15,15 +16,16 @@ pub struct Place {
     pub sample: u32,
 }
 
-/// Runs `path` for every sample of every pixel of a piece of work, in order, and adds what it gives.
+/// Runs `path` for every sample of every pixel of a piece of work, in order, and adds what it gives; `tally` hears of its light.
 ///
 /// # Errors
 /// What `path` stops with, or the film.
 #[inline(always)]
-pub fn each<'o>(
+pub fn each<'o, T: Tally>(
     tile: &Tile,
     out: &mut Output<'o>,
-    mut path: impl FnMut(&mut Output<'o>, Place) -> Outcome<PixelSample>,
+    mut tally: T,
+    mut path: impl FnMut(&mut Output<'o>, &mut T, Place) -> Outcome<PixelSample>,
 ) -> Outcome<()> {
     for y in tile.min[1]..tile.max[1] {
         for x in tile.min[0]..tile.max[0] {
@@ -34,8 +36,8 @@ pub fn each<'o>(
                     index,
                     sample,
                 };
-                let found = path(out, place)?;
-                out.add(x, y, &found)?;
+                let found = path(out, &mut tally, place)?;
+                tally.finish(out, place.pixel, &found)?;
             }
         }
     }

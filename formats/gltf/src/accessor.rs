@@ -99,6 +99,20 @@ impl<'c> Accessors<'c> {
         Ok(flat.as_chunks::<N>().0.to_vec())
     }
 
+    /// Colours with opacity, 1 if the file gives none; in [0, ∞).
+    pub fn colors(&self, index: Index<json::Accessor>) -> Fallible<Vec<[f64; 4]>> {
+        let accessor = self.root.accessors.get(index.value());
+        let rgb = accessor.is_some_and(|a| matches!(a.type_, Checked::Valid(Type::Vec3)));
+        let mut all: Vec<[f64; 4]> = if rgb {
+            let opaque = |[r, g, b]: [f64; 3]| [r, g, b, 1.0];
+            self.vectors::<3>(index)?.into_iter().map(opaque).collect()
+        } else {
+            self.vectors::<4>(index)?
+        };
+        all.iter_mut().flatten().for_each(|v| *v = v.max(0.0));
+        Ok(all)
+    }
+
     /// Indices of vertices.
     pub fn indices(&self, index: Index<json::Accessor>) -> Fallible<Vec<u32>> {
         let (flat, component) = self.read(index, Type::Scalar)?;

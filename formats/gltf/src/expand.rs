@@ -70,6 +70,7 @@ impl Expansion {
                     .extend(mesh.places.iter().map(|place| Instance {
                         prototype: name.clone(),
                         transform: place.then(transform),
+                        transforms: None,
                         material: shape.material.clone(),
                     }));
                 continue;
@@ -132,6 +133,12 @@ fn placed(own: &Shape, place: &Transform, given: &Shape) -> Shape {
         shape.material = given.material.clone();
         shape.emission = None;
         shape.emission_texture = None;
+    }
+    if given.emission.is_some() {
+        shape.emission = given.emission;
+        shape.emission_texture = given.emission_texture.clone();
+        shape.two_sided = given.two_sided;
+        shape.shaping = given.shaping;
     }
     if given.interior.is_some() {
         shape.interior = given.interior.clone();

@@ -24,6 +24,8 @@ pub(crate) struct Converted {
     pub two_sided: bool,
     /// The set of texture coordinates that its textures use.
     pub uv_set: u32,
+    /// It has a normal map, for which tangents count.
+    pub has_normal_map: bool,
 }
 
 /// Collects what materials need.
@@ -36,9 +38,12 @@ pub(crate) struct Materials<'c> {
     pub materials: IndexMap<String, Material>,
     pub media: IndexMap<String, Medium>,
     pub warnings: Vec<String>,
-    /// By index; the last is the default material.
-    done: Vec<(Option<usize>, Converted)>,
+    /// By index (`None` is the default material) and whether vertices have colours.
+    done: Vec<(Wanted, Converted)>,
 }
+
+/// Index of a material, and whether the colours of vertices are factors of its base colour.
+type Wanted = (Option<usize>, bool);
 
 /// How a texture is used.
 #[derive(Clone, Copy)]
@@ -46,12 +51,15 @@ struct Use {
     space: ColorSpace,
     channel: Option<TextureChannel>,
     scale: [f64; 3],
+    /// Multiplied with the colours of vertices, and there for them alone if the material names no image.
+    vertex_color: bool,
 }
 
 const COLOR: Use = Use {
     space: ColorSpace::Srgb,
     channel: None,
     scale: [1.0; 3],
+    vertex_color: false,
 };
 
 fn data(channel: TextureChannel, factor: f64) -> Use {
@@ -59,6 +67,7 @@ fn data(channel: TextureChannel, factor: f64) -> Use {
         space: ColorSpace::Linear,
         channel: Some(channel),
         scale: [factor; 3],
+        vertex_color: false,
     }
 }
 
@@ -79,9 +88,11 @@ impl<'c> Materials<'c> {
         }
     }
 
-    /// The material of an index, or the default one, converted on first use.
-    pub fn get(&mut self, index: Option<usize>) -> Fallible<Converted> {
-        if let Some((_, c)) = self.done.iter().find(|(i, _)| *i == index) {
+    /// The material of an index, or the default one, converted on first use; with `colored` its base colour is multiplied with the
+    /// colours of vertices.
+    pub fn get(&mut self, index: Option<usize>, colored: bool) -> Fallible<Converted> {
+        let wanted = (index, colored);
+        if let Some((_, c)) = self.done.iter().find(|(w, _)| *w == wanted) {
             return Ok(c.clone());
         }
         let none = Value::Object(serde_json::Map::new());
@@ -97,14 +108,19 @@ impl<'c> Materials<'c> {
             (Some(i), None) => format!("{}material {i}", self.prefix),
             (None, _) => format!("{}default material", self.prefix),
         };
+        let name = if colored {
+            format!("{name} with colors")
+        } else {
+            name
+        };
         let converted = self
-            .convert(value, name)
+            .convert(value, name, colored)
             .map_err(|what| format!("{at}.{what}"))?;
-        self.done.push((index, converted.clone()));
+        self.done.push((wanted, converted.clone()));
         Ok(converted)
     }
 
-    fn convert(&mut self, m: &Value, name: String) -> Fallible<Converted> {
+    fn convert(&mut self, m: &Value, name: String, colored: bool) -> Fallible<Converted> {
         let none = Value::Null;
         let pbr = m.get("pbrMetallicRoughness").unwrap_or(&none);
         let mut out = Converted {
@@ -125,20 +141,30 @@ impl<'c> Materials<'c> {
             let strength = number(e, "emissiveStrength", 1.0, BRIGHT)?;
             emission = emission.map(|v| v * strength);
         }
-        let mut glow = m.get("emissiveTexture");
+        let (mut glow, mut shade) = (m.get("emissiveTexture"), COLOR);
         let mut block = if unlit {
             // Shows its colour whatever the light: a black surface that glows.
             emission = color;
             glow = pbr.get("baseColorTexture");
+            shade.vertex_color = colored;
             PluginBlock::new("diffuse").with("reflectance", 0.0)
         } else {
-            self.principled(m, pbr, color, &name, &mut out)?
+            let base = Use {
+                scale: color,
+                vertex_color: colored,
+                ..COLOR
+            };
+            self.principled(m, pbr, base, &name, &mut out)?
         };
         if emission.iter().any(|v| *v > 0.0) {
             out.emission = Some(emission);
-            out.emission_texture = self.texture(glow, &name, "emission", COLOR)?;
+            out.emission_texture = self.texture(glow, &name, "emission", shade)?;
         }
-        block = self.opacity(m, pbr, base[3], block, &name)?;
+        let alpha = Use {
+            vertex_color: colored,
+            ..data(TextureChannel::Alpha, base[3])
+        };
+        block = self.opacity(m, pbr, alpha, block, &name)?;
         if m.get("occlusionTexture").is_some() {
             self.warn("occlusionTexture", "light transport finds occlusion itself");
         }
@@ -154,6 +180,7 @@ impl<'c> Materials<'c> {
             }
             None => None,
         };
+        out.has_normal_map = normal_map.is_some();
         self.materials.insert(name, Material { block, normal_map });
         Ok(out)
     }
@@ -163,18 +190,14 @@ impl<'c> Materials<'c> {
         &mut self,
         m: &Value,
         pbr: &Value,
-        color: [f64; 3],
+        base: Use,
         name: &str,
         out: &mut Converted,
     ) -> Fallible<PluginBlock> {
         use TextureChannel::{Alpha, Blue, Green, Red};
         let mut block = PluginBlock::new("principled");
-        let base = Use {
-            scale: color,
-            ..COLOR
-        };
         let texture = self.texture(pbr.get("baseColorTexture"), name, "base color", base)?;
-        block = block.with("base_color", either(texture, color.into()));
+        block = block.with("base_color", either(texture, base.scale.into()));
         let rough = pbr.get("metallicRoughnessTexture");
         for (key, factor, channel, parameter) in [
             ("metallicFactor", 1.0, Blue, "metallic"),
@@ -283,7 +306,7 @@ impl<'c> Materials<'c> {
         &mut self,
         m: &Value,
         pbr: &Value,
-        alpha: f64,
+        alpha: Use,
         block: PluginBlock,
         name: &str,
     ) -> Fallible<PluginBlock> {
@@ -295,7 +318,8 @@ impl<'c> Materials<'c> {
             Some(other) => return Err(format!("alphaMode: {other:?} is none")),
         };
         let info = pbr.get("baseColorTexture");
-        let texture = self.texture(info, name, "opacity", data(TextureChannel::Alpha, alpha))?;
+        let texture = self.texture(info, name, "opacity", alpha)?;
+        let alpha = alpha.scale[0];
         let there = alpha == 1.0 && cutoff.is_none_or(|c| c <= 1.0);
         if texture.is_none() && there {
             return Ok(block);
@@ -333,7 +357,17 @@ impl<'c> Materials<'c> {
         role: &str,
         setup: Use,
     ) -> Fallible<Option<String>> {
-        let Some(info) = info else { return Ok(None) };
+        let Some(info) = info else {
+            if !setup.vertex_color {
+                return Ok(None);
+            }
+            let mut out = Texture::new(ImageSource::White);
+            out.vertex_color = true;
+            (out.channel, out.scale) = (setup.channel, setup.scale);
+            let name = format!("{name} {role}");
+            self.textures.insert(name.clone(), out);
+            return Ok(Some(name));
+        };
         let at = index(info, "index")?.ok_or("a texture has no index")?;
         let texture = element(self.raw, "textures", at)
             .ok_or_else(|| format!("textures[{at}] does not exist"))?;
@@ -357,6 +391,7 @@ impl<'c> Materials<'c> {
         let nearest = sampler.get("magFilter").and_then(Value::as_u64) == Some(9728);
         let mut out = Texture::new(image);
         out.color_space = setup.space;
+        out.vertex_color = setup.vertex_color;
         out.wrap = [wrap("wrapS"), wrap("wrapT")];
         out.filter = if nearest {
             TextureFilter::Nearest

@@ -66,12 +66,12 @@ impl<'c> Meshes<'c> {
         }
         let positions = attribute(Semantic::Positions).ok_or("has no positions")?;
         if p.targets.as_ref().is_some_and(|t| !t.is_empty()) {
-            materials.warn("morph targets", "meshes are shown in their base shape");
+            let mesh = at.split('.').next().unwrap_or(at);
+            let what = format!("morph targets of {mesh}");
+            materials.warn(&what, "the mesh is shown in its base shape");
         }
-        if attribute(Semantic::Colors(0)).is_some() {
-            materials.warn("COLOR_0", "vertex colours are not used");
-        }
-        let material = materials.get(p.material.map(|m| m.value()))?;
+        let colors = attribute(Semantic::Colors(0));
+        let material = materials.get(p.material.map(|m| m.value()), colors.is_some())?;
         let positions = self.accessors.vectors::<3>(positions)?;
         let order = match p.indices {
             Some(indices) => self.accessors.indices(indices)?,
@@ -101,9 +101,22 @@ impl<'c> Meshes<'c> {
             Some(a) => self.accessors.vectors::<2>(a)?,
             None => Vec::new(),
         };
+        let colors = match colors {
+            Some(a) => self.accessors.colors(a)?,
+            None => Vec::new(),
+        };
+        // Without normals the ones of the file's tangents are not known.
+        let tangents = match attribute(Semantic::Tangents) {
+            Some(a) if material.has_normal_map && !normals.is_empty() => {
+                self.accessors.vectors::<4>(a)?
+            }
+            _ => Vec::new(),
+        };
         for (name, count) in [
             ("normals", normals.len()),
             ("texture coordinates", uvs.len()),
+            ("colours", colors.len()),
+            ("tangents", tangents.len()),
         ] {
             if count != 0 && count != positions.len() {
                 return Err(format!(
@@ -116,7 +129,17 @@ impl<'c> Meshes<'c> {
             return Ok(None);
         }
         Ok(Some(shape(
-            compact(positions, normals, uvs, triangles),
+            compact(
+                Mesh {
+                    positions,
+                    normals,
+                    uvs,
+                    colors,
+                    tangents,
+                    ..Mesh::default()
+                },
+                triangles,
+            ),
             &material,
         )))
     }
@@ -129,6 +152,7 @@ fn shape(mesh: Mesh, material: &Converted) -> Shape {
         emission: material.emission,
         emission_texture: material.emission_texture.clone(),
         two_sided: material.two_sided && material.emission.is_some(),
+        shaping: None,
         interior: material.interior.clone(),
         priority: 0,
     }
@@ -156,14 +180,9 @@ fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
 
 /// The mesh with the vertices that its triangles use, in the order of their use: primitives often share one large set. v is turned
 /// upwards.
-fn compact(
-    positions: Vec<[f64; 3]>,
-    normals: Vec<[f64; 3]>,
-    uvs: Vec<[f64; 2]>,
-    triangles: Vec<[u32; 3]>,
-) -> Mesh {
+fn compact(all: Mesh, triangles: Vec<[u32; 3]>) -> Mesh {
     const NONE: u32 = u32::MAX;
-    let mut new = vec![NONE; positions.len()];
+    let mut new = vec![NONE; all.positions.len()];
     let mut mesh = Mesh::default();
     mesh.indices = triangles
         .iter()
@@ -172,9 +191,11 @@ fn compact(
                 let i = i as usize;
                 if new[i] == NONE {
                     new[i] = mesh.positions.len() as u32;
-                    mesh.positions.push(positions[i]);
-                    mesh.normals.extend(normals.get(i));
-                    mesh.uvs.extend(uvs.get(i).map(|[u, v]| [*u, 1.0 - v]));
+                    mesh.positions.push(all.positions[i]);
+                    mesh.normals.extend(all.normals.get(i));
+                    mesh.uvs.extend(all.uvs.get(i).map(|[u, v]| [*u, 1.0 - v]));
+                    mesh.colors.extend(all.colors.get(i));
+                    mesh.tangents.extend(all.tangents.get(i));
                 }
                 new[i]
             })

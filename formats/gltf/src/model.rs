@@ -3,7 +3,8 @@
 use gltf::json;
 use gltf::json::validation::Checked;
 use resolvent_scene::{
-    Camera, Geometry, IndexMap, Light, Material, Medium, Pose, Shape, Texture, Transform,
+    Camera, Geometry, IndexMap, Light, Material, Medium, Pose, Projection, Shape, Texture,
+    Transform,
 };
 use serde_json::Value;
 use std::path::Path;
@@ -175,8 +176,13 @@ fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
             let light = punctual(&container.raw, light, &to_world, &mut materials);
             model.lights.extend(light.map_err(at)?);
         }
-        if node.skin.is_some() {
-            materials.warn("skins", "meshes are shown in their bind pose");
+        if let Some(skin) = node.skin.map(|s| s.value()) {
+            let named = root.skins.get(skin).and_then(|s| s.name.as_deref());
+            let what = match named {
+                Some(name) => format!("skin '{name}'"),
+                None => format!("skins[{skin}]"),
+            };
+            materials.warn(&what, "the mesh is shown in its bind pose");
         }
         let Some(mesh) = node.mesh.map(|m| m.value()) else {
             continue;
@@ -347,9 +353,11 @@ fn view(
         name,
         camera: Camera {
             pose: Pose::Transform(pose),
-            fov_x_deg,
+            projection: Projection::Perspective { fov_x_deg },
             lens_radius: 0.0,
             focus_distance: 1.0,
+            shift: [0.0; 2],
+            exposure: 0.0,
         },
         aspect,
     })

@@ -4,7 +4,8 @@ mod common;
 
 use common::{Builder, PIXEL, everything};
 use resolvent_scene::{
-    ColorSpace, ImageSource, Light, PluginBlock, Pose, TextureChannel, TextureFilter, Value, Wrap,
+    ColorSpace, ImageSource, Light, PluginBlock, Pose, Projection, TextureChannel, TextureFilter,
+    Value, Wrap,
 };
 use serde_json::json;
 
@@ -280,11 +281,10 @@ fn cameras_look_along_their_nodes() {
     let camera = &model.cameras[0];
     assert_eq!(camera.aspect, Some(1.5));
     let expected = 2.0 * ((0.25f64).tan() * 1.5).atan().to_degrees();
-    assert!(
-        (camera.camera.fov_x_deg - expected).abs() < 1e-5,
-        "{}",
-        camera.camera.fov_x_deg
-    );
+    let Projection::Perspective { fov_x_deg } = camera.camera.projection else {
+        panic!()
+    };
+    assert!((fov_x_deg - expected).abs() < 1e-5, "{fov_x_deg}");
     let Pose::Transform(t) = &camera.camera.pose else {
         panic!()
     };
@@ -343,4 +343,89 @@ fn lights_keep_their_numbers() {
     assert!((angle_deg - 1f64.to_degrees()).abs() < 1e-6, "{angle_deg}");
     assert!((inner_angle_deg - 0.2f64.to_degrees()).abs() < 1e-6);
     assert_eq!(model.lights.len(), 3);
+}
+
+/// COLOR_0 is a factor of base colour and opacity, tangents are there for normal maps, and what has no effect is named.
+#[test]
+fn colours_and_tangents_of_vertices() {
+    let mut b = Builder::new();
+    let view = b.view(PIXEL);
+    b.push(
+        "images",
+        json!({"bufferView": view, "mimeType": "image/png"}),
+    );
+    b.push("textures", json!({"source": 0}));
+    let textured = b.push(
+        "materials",
+        json!({
+            "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 1.0, 1.0, 0.5]},
+            "normalTexture": {"index": 0}, "alphaMode": "BLEND"
+        }),
+    );
+    let unlit = b.push(
+        "materials",
+        json!({"extensions": {"KHR_materials_unlit": {}}}),
+    );
+    b.json["extensionsUsed"] = json!(["KHR_materials_unlit"]);
+    let mesh = b.square(Some(textured));
+    let colors = b.floats(&[1., 0., 0., 0., 1., 0., 0., 0., 1., 1., 1., 1.], 3);
+    let tangents = b.floats(
+        &[
+            1., 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., 1., 1., 0., 0., -1.,
+        ],
+        4,
+    );
+    let normals = b.floats(&[0., 0., 1., 0., 0., 1., 0., 0., 1., 0., 0., 1.], 3);
+    let bytes = b.view(&[255, 0, 0, 51, 0, 255, 0, 255, 0, 0, 255, 255, 0, 0, 0, 0]);
+    let rgba = b.push(
+        "accessors",
+        json!({"bufferView": bytes, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC4"}),
+    );
+    let mut primitives = b.json["meshes"][mesh]["primitives"].clone();
+    let mut second = primitives[0].clone();
+    primitives[0]["attributes"]["COLOR_0"] = json!(colors);
+    primitives[0]["attributes"]["TANGENT"] = json!(tangents);
+    primitives[0]["attributes"]["NORMAL"] = json!(normals);
+    primitives[0]["targets"] = json!([{"POSITION": primitives[0]["attributes"]["POSITION"]}]);
+    second["attributes"]["COLOR_0"] = json!(rgba);
+    second["attributes"]["TANGENT"] = json!(tangents);
+    let mut third = second.clone();
+    second.as_object_mut().unwrap().remove("material");
+    third["material"] = json!(unlit);
+    primitives.as_array_mut().unwrap().extend([second, third]);
+    b.json["meshes"][mesh]["primitives"] = primitives;
+    b.push("nodes", json!({"mesh": mesh, "skin": 0}));
+    b.push("skins", json!({"name": "bones", "joints": [0]}));
+    let model = b.read();
+    let shapes = &model.meshes[0].shapes;
+
+    let first = common::mesh(&shapes[0]);
+    assert_eq!(first.colors[1], [0.0, 1.0, 0.0, 1.0]);
+    assert_eq!(first.tangents[3], [1.0, 0.0, 0.0, -1.0]);
+    let m = &model.materials[shapes[0].material.as_ref().unwrap()].block;
+    let opacity = &model.textures[texture(m, "opacity").unwrap()];
+    assert!(opacity.vertex_color && opacity.channel == Some(TextureChannel::Alpha));
+    let inner = m.params["bsdf"].value.as_plugin().unwrap();
+    let base = &model.textures[texture(inner, "base_color").unwrap()];
+    assert!(base.vertex_color && base.scale == [0.5, 1.0, 1.0]);
+    assert!(matches!(base.image, ImageSource::Memory(_)));
+
+    // Without an image they stand alone; without a normal map tangents are not kept.
+    let second = common::mesh(&shapes[1]);
+    assert_eq!(second.colors[0], [1.0, 0.0, 0.0, 0.2]);
+    assert!(second.tangents.is_empty());
+    let m = &model.materials[shapes[1].material.as_ref().unwrap()].block;
+    let base = &model.textures[texture(m, "base_color").unwrap()];
+    assert!(base.vertex_color && base.image == ImageSource::White);
+    let glow = shapes[2].emission_texture.as_ref().unwrap();
+    assert!(model.textures[glow].vertex_color && shapes[2].emission == Some([1.0; 3]));
+
+    let warned = |what: &str| model.warnings.iter().any(|w| w.starts_with(what));
+    assert!(warned("skin 'bones': "), "{:?}", model.warnings);
+    assert!(
+        warned("morph targets of meshes[0]: "),
+        "{:?}",
+        model.warnings
+    );
+    assert!(!warned("COLOR_0"));
 }

@@ -60,6 +60,19 @@ impl Scalar {
         }
     }
 
+    /// The largest value of an integer type.
+    pub fn largest(self) -> Option<f64> {
+        Some(match self {
+            Self::I8 => f64::from(i8::MAX),
+            Self::U8 => f64::from(u8::MAX),
+            Self::I16 => f64::from(i16::MAX),
+            Self::U16 => f64::from(u16::MAX),
+            Self::I32 => f64::from(i32::MAX),
+            Self::U32 => f64::from(u32::MAX),
+            Self::F32 | Self::F64 => return None,
+        })
+    }
+
     fn is_integer(self) -> bool {
         !matches!(self, Self::F32 | Self::F64)
     }

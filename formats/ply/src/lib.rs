@@ -1,4 +1,4 @@
-//! PLY triangle meshes: ASCII and binary of either byte order; positions, normals, texture coordinates and faces.
+//! PLY triangle meshes: ASCII and binary of either byte order; positions, normals, texture coordinates, colours and faces.
 //!
 //! ```no_run
 //! let mesh = resolvent_ply::read("bunny.ply")?;
@@ -7,7 +7,9 @@
 //! ```
 //!
 //! - Element `vertex`: `x y z`; if present `nx ny nz`; texture coordinates as `u v`, `s t`, `texture_u texture_v` or
-//!   `texture_s texture_t`. Any scalar type; other properties and elements are passed over.
+//!   `texture_s texture_t`; colours as `red green blue` or `r g b`, with `alpha` or `a` if there. Any scalar type; other properties
+//!   and elements are passed over. Colours of integer types are taken as fractions of the type's largest value, encoded by the curve
+//!   of sRGB, as programs write them; floating-point ones are linear as they are. Negative ones are an error.
 //! - Element `face`: the list `vertex_indices` or `vertex_index`. Polygons become a fan around their first vertex, which is right
 //!   for convex ones; **a concave polygon is not triangulated properly**. A face with fewer than three vertices is an error.
 //! - Per-face texture coordinates (MeshLab's `texcoord` lists) are passed over. Triangle strips are refused by name.
@@ -33,6 +35,8 @@ pub struct Mesh {
     pub normals: Option<Vec<[f32; 3]>>,
     /// Texture coordinates, one pair a vertex.
     pub uvs: Option<Vec<[f32; 2]>>,
+    /// Linear red, green, blue and opacity, one a vertex.
+    pub colors: Option<Vec<[f32; 4]>>,
     /// Triangles, in the faces' winding.
     pub indices: Vec<[u32; 3]>,
 }

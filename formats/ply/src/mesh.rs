@@ -55,7 +55,10 @@ pub(crate) fn assemble(header: &Header, bytes: &[u8]) -> Result<Mesh, Fault> {
     Ok(mesh)
 }
 
-/// Where a vertex property goes: component of position (0-2), normal (3-5) or texture coordinates (6-7).
+/// Numbers of a vertex that are taken.
+const SLOTS: usize = 12;
+
+/// Where a vertex property goes: component of position (0-2), normal (3-5), texture coordinates (6-7) or colour (8-11).
 fn vertex_slots(element: &Element) -> Result<Vec<Option<usize>>, Fault> {
     let mut slots = vec![None; element.properties.len()];
     let mut take = |names: &[&str], first: usize| -> bool {
@@ -86,6 +89,12 @@ fn vertex_slots(element: &Element) -> Result<Vec<Option<usize>>, Fault> {
         ["texture_s", "texture_t"],
     ];
     let _ = pairs.iter().any(|pair| take(pair, 6));
+    for (colors, alpha) in [(["red", "green", "blue"], "alpha"), (["r", "g", "b"], "a")] {
+        if take(&colors, 8) {
+            take(&[alpha], 11);
+            break;
+        }
+    }
     Ok(slots)
 }
 
@@ -99,8 +108,12 @@ fn read_vertices(body: &mut Body, element: &Element, mesh: &mut Mesh) -> Result<
     let mut uvs = slots
         .contains(&Some(6))
         .then(|| Vec::with_capacity(plausible));
+    let mut colors = slots
+        .contains(&Some(8))
+        .then(|| Vec::with_capacity(plausible));
     for vertex in 0..element.count {
-        let mut values = [0f32; 8];
+        let mut values = [0f32; SLOTS];
+        values[11] = 1.0;
         for (property, slot) in element.properties.iter().zip(&slots) {
             match (property.kind, slot) {
                 (Kind::Scalar(s), &Some(k)) => {
@@ -113,11 +126,21 @@ fn read_vertices(body: &mut Body, element: &Element, mesh: &mut Mesh) -> Result<
                             format!("{name} of vertex {vertex} is {value}; not a finite f32");
                         return Err(Fault { place, reason });
                     }
+                    if k >= 8 {
+                        values[k] = color(value, s, k == 11);
+                        if values[k] < 0.0 {
+                            let name = quoted(&property.name);
+                            let reason = format!(
+                                "{name} of vertex {vertex} is {value}; a colour is at least 0"
+                            );
+                            return Err(Fault { place, reason });
+                        }
+                    }
                 }
                 (kind, _) => body.skip(kind)?,
             }
         }
-        let [x, y, z, nx, ny, nz, u, v] = values;
+        let [x, y, z, nx, ny, nz, u, v, rgba @ ..] = values;
         mesh.positions.push([x, y, z]);
         if let Some(normals) = &mut normals {
             normals.push([nx, ny, nz]);
@@ -125,9 +148,29 @@ fn read_vertices(body: &mut Body, element: &Element, mesh: &mut Mesh) -> Result<
         if let Some(uvs) = &mut uvs {
             uvs.push([u, v]);
         }
+        if let Some(colors) = &mut colors {
+            colors.push(rgba);
+        }
     }
-    (mesh.normals, mesh.uvs) = (normals, uvs);
+    (mesh.normals, mesh.uvs, mesh.colors) = (normals, uvs, colors);
     Ok(())
+}
+
+/// A component of a colour as a linear number.
+fn color(value: f64, scalar: Scalar, is_alpha: bool) -> f32 {
+    let Some(largest) = scalar.largest() else {
+        return value as f32;
+    };
+    let e = value / largest;
+    // The curve of IEC 61966-2-1.
+    let linear = if is_alpha {
+        e
+    } else if e <= 0.040_45 {
+        e / 12.92
+    } else {
+        ((e + 0.055) / 1.055).powf(2.4)
+    };
+    linear as f32
 }
 
 fn read_faces(

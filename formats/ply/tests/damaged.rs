@@ -194,6 +194,7 @@ fn errors_say_where_and_why() {
 fn binary_errors_name_bytes() {
     let mesh = Mesh {
         positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        colors: None,
         indices: vec![[0, 1, 2]],
         ..Mesh::default()
     };

@@ -20,6 +20,7 @@ fn sample() -> Mesh {
             [2.0, -3.0, 4.0],
         ]),
         uvs: Some(vec![[0.0, 1.0], [0.25, 0.75], [-2.0, 3.5], [1.0, 0.0]]),
+        colors: None,
         indices: vec![[0, 1, 2], [2, 1, 3], [3, 0, 2]],
     }
 }
@@ -39,6 +40,53 @@ fn round_trips() {
             }
         }
     }
+}
+
+/// Integers are encoded fractions, floating-point numbers linear as they are.
+#[test]
+fn colours_of_vertices() {
+    let file = |kind: &str, names: [&str; 4], values: &str| {
+        let [r, g, b, a] = names;
+        let alpha = if a.is_empty() {
+            String::new()
+        } else {
+            format!("property {kind} {a}\n")
+        };
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty {kind} {r}\nproperty {kind} {g}\n\
+             property float y\nproperty {kind} {b}\n{alpha}property float z\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n{values}3 0 1 2\n"
+        )
+    };
+    let names = ["red", "green", "blue", "alpha"];
+    let text = file(
+        "uchar",
+        names,
+        "0 0 255 0 188 51 0\n1 255 0 0 0 255 0\n0 0 0 1 0 0 0\n",
+    );
+    let mesh = parse(text.as_bytes()).unwrap();
+    let colors = mesh.colors.unwrap();
+    assert_eq!(colors[1], [1.0, 0.0, 0.0, 1.0]);
+    let [r, g, b, a] = colors[0];
+    assert!((r, g) == (0.0, 1.0) && (a - 0.2).abs() < 1e-7);
+    // 188 is encoded one half, as IEC 61966-2-1's table has it.
+    assert!((b - 0.502_886_5).abs() < 1e-6, "{b}");
+    assert_eq!(mesh.positions[2], [0.0, 1.0, 0.0]);
+    let text = file(
+        "float",
+        ["r", "g", "b", ""],
+        "0 0.25 2 0 0.5 0\n1 0 0 0 0 0\n0 0 0 1 0 0\n",
+    );
+    let colors = parse(text.as_bytes()).unwrap().colors.unwrap();
+    assert_eq!(colors[0], [0.25, 2.0, 0.5, 1.0]);
+    let error = parse(text.replace("0.25", "-1").as_bytes()).unwrap_err();
+    assert!(
+        error.to_string().contains("a colour is at least 0"),
+        "{error}"
+    );
+    // Two of the three are none.
+    let text = text.replace("float b\n", "float w\n");
+    assert_eq!(parse(text.as_bytes()).unwrap().colors, None);
 }
 
 #[test]

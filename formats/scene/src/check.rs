@@ -88,18 +88,7 @@ impl<'d> Checker<'d> {
                 Data::Text(t) if !t.is_empty() && !t.contains('\0') => {}
                 _ => self.mismatch(node, "a text that is not empty"),
             },
-            Kind::Choices(names) => {
-                let items = self.list(node, "a list of names", None).unwrap_or_default();
-                for (i, item) in items.iter().enumerate() {
-                    self.choice(item, names);
-                    if items[..i.min(names.len())]
-                        .iter()
-                        .any(|other| same_text(other, item))
-                    {
-                        self.report(item, format!("{} is named twice", item.found()));
-                    }
-                }
-            }
+            Kind::Layers(names, most) => self.layers(node, names, most),
             Kind::Choice(names) => self.choice(node, names),
             Kind::Pair => self.numbers(node, 2, "a list of two numbers", COORDINATE),
             Kind::Factor => match node.data {
@@ -109,6 +98,15 @@ impl<'d> Checker<'d> {
             Kind::Vec3 => self.numbers(node, 3, "a list of three numbers", COORDINATE),
             Kind::Vec3s => self.tuples(node, 3, "a list of three numbers"),
             Kind::Pairs => self.tuples(node, 2, "a list of two numbers"),
+            Kind::Fours => self.tuples(node, 4, "a list of four numbers"),
+            Kind::Colors => {
+                let items = self.list(node, "a list of colours", None);
+                for item in items.unwrap_or_default() {
+                    let rgba = matches!(&item.data, Data::List(n) if n.len() == 4);
+                    let what = "a list of three numbers (RGB) or four (RGBA)";
+                    self.numbers(item, if rgba { 4 } else { 3 }, what, POWER);
+                }
+            }
             Kind::Triangles => {
                 for item in self
                     .list(node, "a list of triangles", None)
@@ -221,6 +219,31 @@ impl<'d> Checker<'d> {
                 );
             }
             _ => self.mismatch(node, &format!("one of {}", names.join(", "))),
+        }
+    }
+
+    /// A list of layers: names, and `orders:N` once.
+    fn layers(&mut self, node: &Node, names: &'static [&'static str], most: u32) {
+        let items = self.list(node, "a list of names", None).unwrap_or_default();
+        let orders = |n: &Node| matches!(&n.data, Data::Text(t) if t.starts_with("orders"));
+        for (i, item) in items.iter().enumerate() {
+            match &item.data {
+                Data::Text(t) if orders(item) => {
+                    if crate::Aov::parse(t).is_none() {
+                        let what = format!(
+                            "{} is no layer; orders are asked for as \"orders:N\", N from 0 to {most}",
+                            quoted(t)
+                        );
+                        self.report(item, what);
+                    }
+                }
+                _ => self.choice(item, names),
+            }
+            // One more than there are names: longer lists repeat one of these.
+            let mut before = items[..i.min(names.len() + 1)].iter();
+            if before.any(|other| same_text(other, item) || (orders(other) && orders(item))) {
+                self.report(item, format!("{} is named twice", item.found()));
+            }
         }
     }
 

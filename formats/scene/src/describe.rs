@@ -105,17 +105,36 @@ impl Default for Units {
     }
 }
 
-/// A perspective camera; with a lens radius it is a thin lens.
+/// A camera; with a lens radius it is a thin lens.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Where it stands and looks.
     pub pose: Pose,
-    /// Full horizontal field of view in degrees, in (0, 180), for pixels that are square.
-    pub fov_x_deg: f64,
-    /// Radius of the lens in scene units, ≥ 0; 0 is a pinhole.
+    /// What it sees from there.
+    pub projection: Projection,
+    /// Radius of the lens in scene units, ≥ 0; 0 is a pinhole. Of no effect for parallel rays.
     pub lens_radius: f64,
     /// Distance along the viewing axis to the plane in focus, > 0. Of no effect for a pinhole.
     pub focus_distance: f64,
+    /// How far the picture's middle lies off the viewing axis, to the right and up, in widths and heights of the picture.
+    pub shift: [f64; 2],
+    /// Stops: the picture is multiplied by 2^exposure.
+    pub exposure: f64,
+}
+
+/// How a camera maps the world to its picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Projection {
+    /// All rays pass through the lens.
+    Perspective {
+        /// Full horizontal field of view in degrees, in (0, 180), without the shift.
+        fov_x_deg: f64,
+    },
+    /// All rays are parallel, and start on the plane through the camera's origin.
+    Orthographic {
+        /// Width of the picture in scene units, > 0.
+        width: f64,
+    },
 }
 
 /// Position and orientation of a camera.
@@ -149,6 +168,8 @@ impl Camera {
 pub struct Film {
     /// Width and height in pixels, each at least 1.
     pub resolution: [u32; 2],
+    /// Width of a pixel over its height, > 0.
+    pub pixel_aspect: f64,
     /// The window that is rendered, `[x0, y0, x1, y1]` in pixels; x1 and y1 are outside of it.
     pub crop: Option<[u32; 4]>,
     /// Reconstruction filter.
@@ -161,6 +182,7 @@ impl Default for Film {
     fn default() -> Film {
         Film {
             resolution: [1280, 720],
+            pixel_aspect: 1.0,
             crop: None,
             filter: Filter::default(),
             aovs: Vec::new(),
@@ -173,6 +195,16 @@ impl Film {
     pub fn window(&self) -> [u32; 4] {
         self.crop
             .unwrap_or([0, 0, self.resolution[0], self.resolution[1]])
+    }
+
+    /// How many layers of light by scattering order there are: one for each order up to that of [`Aov::Orders`], and one for the
+    /// rest; 0 if none are asked for.
+    pub fn order_layers(&self) -> usize {
+        let orders = self.aovs.iter().find_map(|a| match a {
+            Aov::Orders(n) => Some(*n as usize),
+            _ => None,
+        });
+        orders.map_or(0, |n| n + 2)
     }
 }
 
@@ -217,11 +249,14 @@ pub enum Aov {
     Variance,
     /// Samples taken.
     Samples,
+    /// Light by scattering order, as layers `order0` … `orderN` and `order_rest`, which sum to the picture: the N + 1 first terms
+    /// of Σ (GK)^k G Le, and all others. Written `orders:N`.
+    Orders(u32),
 }
 
 impl Aov {
-    /// All of them.
-    pub const ALL: [Aov; 5] = [
+    /// All that a name is enough for.
+    pub const NAMED: [Aov; 5] = [
         Aov::Depth,
         Aov::Albedo,
         Aov::Normal,
@@ -229,7 +264,20 @@ impl Aov {
         Aov::Samples,
     ];
 
-    /// The name in scene files, and of the layer in images.
+    /// Highest order that can have a layer of its own.
+    pub const MOST_ORDERS: u32 = 99;
+
+    /// Reads what stands in scene files and on the command line: a name, or `orders:N`.
+    pub fn parse(text: &str) -> Option<Aov> {
+        if let Some(order) = text.strip_prefix("orders:") {
+            let plain = !order.is_empty() && order.bytes().all(|b| b.is_ascii_digit());
+            let n = order.parse().ok().filter(|_| plain)?;
+            return (n <= Aov::MOST_ORDERS).then_some(Aov::Orders(n));
+        }
+        Aov::NAMED.into_iter().find(|a| a.name() == text)
+    }
+
+    /// The name in scene files, and of the layer in images; without the number of orders.
     pub fn name(self) -> &'static str {
         match self {
             Aov::Depth => "depth",
@@ -237,6 +285,16 @@ impl Aov {
             Aov::Normal => "normal",
             Aov::Variance => "variance",
             Aov::Samples => "samples",
+            Aov::Orders(_) => "orders",
+        }
+    }
+}
+
+impl std::fmt::Display for Aov {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Aov::Orders(n) => write!(f, "orders:{n}"),
+            _ => f.write_str(self.name()),
         }
     }
 }
@@ -266,7 +324,7 @@ pub enum Budget {
     Spp(u64),
     /// After so many seconds, > 0.
     Time(f64),
-    /// When the estimated relative error of the picture is at most this, > 0.
+    /// When the estimated relative error of every tile of the picture is at most this, > 0.
     Error(f64),
 }
 
@@ -346,16 +404,32 @@ pub enum Environment {
         /// W·sr⁻¹·m⁻², ≥ 0.
         radiance: Vec3,
     },
-    /// A latitude-longitude image (OpenEXR's convention): +y is up, the centre of the image is +z, and
-    /// a direction ω stands at u = ½ − atan2(ω_x, ω_z)/2π, v = acos(ω_y)/π from the upper left corner.
+    /// An image of all directions: +y is up, its centre is +z.
     Image {
         /// The image, as the scene names it; see [`Scene::resolve`].
         file: String,
+        /// How it shows the directions.
+        mapping: Mapping,
         /// Factor on its pixels, ≥ 0.
         scale: Vec3,
-        /// Image to world, a rotation.
+        /// Image to world, a rotation or a reflection.
         rotation: Transform,
     },
+}
+
+/// How an image shows all directions. (u, v) goes from the upper left corner to the lower right one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mapping {
+    /// Latitude and longitude, OpenEXR's convention: ω stands at u = ½ − atan2(ω_x, ω_z)/2π, v = acos(ω_y)/π.
+    #[default]
+    LatLong,
+    /// A mirroring ball seen from afar, from +z: at its point with normal n it shows the direction 2 n_z n − z. The ball fills
+    /// the image.
+    MirroredBall,
+    /// A disk with +z in its centre, the angle from it proportional to the radius, +x right and +y up.
+    Angular,
+    /// A cube folded out to three columns and four rows, seen from inside: +y; then +x, +z, −x; then −y; then −z upside down.
+    VerticalCross,
 }
 
 /// What surfaces are made of.
@@ -399,6 +473,8 @@ pub struct Shape {
     pub emission_texture: Option<String>,
     /// Emits from both sides; of no meaning without emission.
     pub two_sided: bool,
+    /// Directions that the emission favours; of no meaning without emission.
+    pub shaping: Option<Shaping>,
     /// Name in [`Scene::media`] of what fills it; for closed shapes only.
     pub interior: Option<String>,
     /// Where closed shapes overlap that refract or have an interior, those of the highest priority fill the overlap, and the
@@ -407,13 +483,32 @@ pub struct Shape {
     pub priority: i32,
 }
 
-/// A copy of a prototype.
+/// A factor on emission by the angle θ from an axis: 0 beyond a cone's half angle θ_c, and within it
+/// [1 − smoothstep(θ; (1 − softness) θ_c, θ_c)] · [tint + (1 − tint) |cos θ|^focus], as UsdLux's `ShapingAPI` has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shaping {
+    /// The axis, in world, or in a prototype's space; need not be of length 1, but not zero.
+    pub axis: Vec3,
+    /// Full angle 2 θ_c of the cone, degrees, in (0, 360]; 360 is no cone.
+    pub angle_deg: f64,
+    /// Share of θ_c over which the emission falls to 0, in [0, 1].
+    pub softness: f64,
+    /// Power of the cosine, ≥ 0.
+    pub focus: f64,
+    /// Factor where that power is 0, ≥ 0.
+    pub focus_tint: Vec3,
+}
+
+/// A copy of a prototype, or many.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
     /// Name in [`Scene::prototypes`].
     pub prototype: String,
     /// The prototype's space to world; it may stretch, shear and mirror.
     pub transform: Transform,
+    /// A table of transforms, as the scene names it: there is a copy for each of them, placed by it and then by `transform`. See
+    /// [`crate::table`].
+    pub transforms: Option<String>,
     /// Name in [`Scene::materials`] of what replaces the material of every shape of the prototype.
     pub material: Option<String>,
 }
@@ -485,6 +580,11 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// One texture coordinate per corner, or empty.
     pub uvs: Vec<[f64; 2]>,
+    /// One linear colour and opacity per corner, or empty: what textures with [`Texture::vertex_color`] are multiplied with.
+    pub colors: Vec<[f64; 4]>,
+    /// One tangent per corner, or empty: the direction of growing u for normal maps and anisotropy, and with a negative fourth
+    /// number growing v on the other side of it than usual. Without any they are taken from the texture coordinates.
+    pub tangents: Vec<[f64; 4]>,
     /// The mesh's space to world.
     pub transform: Transform,
 }

@@ -3,6 +3,8 @@
 //! The checker ([`crate::check`]) and the JSON Schema ([`crate::schema`]) are both driven by them, so that
 //! what the one accepts is what the other describes.
 
+use crate::describe::Aov;
+
 /// The format's version, the value of the key `resolvent`.
 pub const VERSION: u32 = 1;
 
@@ -108,8 +110,8 @@ pub(crate) enum Kind {
     Text,
     /// A text that is not empty: names and paths.
     Name,
-    /// A list of different names out of these.
-    Choices(&'static [&'static str]),
+    /// A list of different layers (see [`crate::Aov`]): these, and `orders:N` with N up to the number.
+    Layers(&'static [&'static str], u32),
     /// One name out of these.
     Choice(&'static [&'static str]),
     /// Three coordinates.
@@ -122,6 +124,10 @@ pub(crate) enum Kind {
     Vec3s,
     /// A list of pairs of numbers.
     Pairs,
+    /// A list of lists of four numbers.
+    Fours,
+    /// A list of lists of three or four numbers ≥ 0.
+    Colors,
     /// A list of three indices each.
     Triangles,
     /// One number or three, ≥ 0.
@@ -205,7 +211,11 @@ pub(crate) static SCENE: Object = Object {
             Kind::Object(&UNITS),
             "Physical meaning of the lengths",
         ),
-        need("camera", Kind::Variants(&[&PERSPECTIVE]), "The camera"),
+        need(
+            "camera",
+            Kind::Variants(&[&PERSPECTIVE, &ORTHOGRAPHIC]),
+            "The camera",
+        ),
         may(
             "film",
             Kind::Object(&FILM),
@@ -275,7 +285,12 @@ static INSTANCE: Object = Object {
         may(
             "transform",
             Kind::Transform,
-            "The prototype's space to world",
+            "The prototype's space to world; with transforms, applied after each of them",
+        ),
+        may(
+            "transforms",
+            Kind::Name,
+            "A NumPy file (.npy) of many copies' transforms: f32 or f64 of shape (n, 3, 4) or (n, 4, 4), rows of matrices that act on column vectors",
         ),
         may(
             "material",
@@ -297,22 +312,37 @@ static UNITS: Object = Object {
     rules: &[],
 };
 
+const ORIGIN: Field = may("origin", Kind::Vec3, "Where the camera stands");
+const TARGET: Field = may("target", Kind::Vec3, "A point in the middle of the picture");
+const UP: Field = may(
+    "up",
+    Kind::Vec3,
+    "A direction that is up in the picture ([0, 1, 0])",
+);
+const CAMERA_TO_WORLD: Field = may(
+    "transform",
+    Kind::Transform,
+    "Camera to world; it looks along -z, y is up",
+);
+const SHIFT: Field = may(
+    "shift",
+    Kind::Pair,
+    "How far the picture's middle lies off the viewing axis, to the right and up, in widths and heights of the picture ([0, 0])",
+);
+const EXPOSURE: Field = may(
+    "exposure",
+    Kind::Number(Range::closed(-100.0, 100.0)),
+    "Stops: the picture is multiplied by 2^exposure (0)",
+);
+
 static PERSPECTIVE: Object = Object {
     name: "perspective",
     help: "A pinhole camera, or a thin lens if lens_radius > 0",
     fields: &[
-        may("origin", Kind::Vec3, "Where the camera stands"),
-        may("target", Kind::Vec3, "A point in the middle of the picture"),
-        may(
-            "up",
-            Kind::Vec3,
-            "A direction that is up in the picture ([0, 1, 0])",
-        ),
-        may(
-            "transform",
-            Kind::Transform,
-            "Camera to world; it looks along -z, y is up",
-        ),
+        ORIGIN,
+        TARGET,
+        UP,
+        CAMERA_TO_WORLD,
         need(
             "fov_x_deg",
             Kind::Number(Range::open(0.0, 180.0)),
@@ -328,14 +358,37 @@ static PERSPECTIVE: Object = Object {
             Kind::Number(Range::above(0.0, FAR)),
             "Distance to the plane in focus (the distance to the target)",
         ),
+        SHIFT,
+        EXPOSURE,
     ],
-    rules: &[
-        Rule::ExactlyOne(&["origin", "transform"]),
-        Rule::Needs("origin", "target"),
-        Rule::AtMostOne(&["target", "transform"]),
-        Rule::AtMostOne(&["up", "transform"]),
-    ],
+    rules: &POSE,
 };
+
+static ORTHOGRAPHIC: Object = Object {
+    name: "orthographic",
+    help: "A camera with parallel rays, which start on the plane through its origin",
+    fields: &[
+        ORIGIN,
+        TARGET,
+        UP,
+        CAMERA_TO_WORLD,
+        need(
+            "width",
+            Kind::Number(Range::above(0.0, FAR)),
+            "Width of the picture in scene units",
+        ),
+        SHIFT,
+        EXPOSURE,
+    ],
+    rules: &POSE,
+};
+
+const POSE: [Rule; 4] = [
+    Rule::ExactlyOne(&["origin", "transform"]),
+    Rule::Needs("origin", "target"),
+    Rule::AtMostOne(&["target", "transform"]),
+    Rule::AtMostOne(&["up", "transform"]),
+];
 
 static FILM: Object = Object {
     name: "film",
@@ -345,6 +398,11 @@ static FILM: Object = Object {
             "resolution",
             Kind::Integers(2, 1, 65_536),
             "Width and height in pixels ([1280, 720])",
+        ),
+        may(
+            "pixel_aspect",
+            Kind::Number(Range::closed(0.01, 100.0)),
+            "Width of a pixel over its height (1)",
         ),
         may(
             "crop",
@@ -358,8 +416,11 @@ static FILM: Object = Object {
         ),
         may(
             "aovs",
-            Kind::Choices(&["depth", "albedo", "normal", "variance", "samples"]),
-            "Further layers",
+            Kind::Layers(
+                &["depth", "albedo", "normal", "variance", "samples"],
+                Aov::MOST_ORDERS,
+            ),
+            "Further layers; \"orders:N\": light scattered 0 to N times, and the rest, in layers that sum to the picture",
         ),
     ],
     rules: &[],
@@ -400,7 +461,7 @@ static SAMPLING: Object = Object {
         may(
             "error",
             Kind::Number(Range::above(0.0, 1e3)),
-            "Estimated relative error to reach",
+            "Estimated relative error that no tile of the picture shall exceed",
         ),
         may(
             "seed",
@@ -456,18 +517,23 @@ static NORMAL_MAP: Object = Object {
     rules: &[],
 };
 
-const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror"]);
+const WRAP: Kind = Kind::Choice(&["repeat", "clamp", "mirror", "black"]);
 
 static TEXTURE: Object = Object {
     name: "texture",
-    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one",
+    help: "An image (PNG, JPEG, OpenEXR, Radiance HDR); (0, 0) is its lower left corner, (1, 1) the upper right one; or vertex colours",
     fields: &[
         may(
             "file",
             Kind::Name,
-            "The image file, relative to the scene file",
+            "The image file, relative to the scene file; <UDIM> in it stands for the numbers of its tiles, 1001 + column + 10 row",
         ),
         may("data", Kind::Name, "The image file's bytes in base64"),
+        may(
+            "vertex_color",
+            Kind::Bool,
+            "Multiplies the image, or white without one, with the mesh's colours (false)",
+        ),
         may(
             "color_space",
             Kind::Choice(&["auto", "srgb", "linear", "raw"]),
@@ -503,7 +569,8 @@ static TEXTURE: Object = Object {
         ),
     ],
     rules: &[
-        Rule::ExactlyOne(&["file", "data"]),
+        Rule::AtLeastOne(&["file", "data", "vertex_color"]),
+        Rule::AtMostOne(&["file", "data"]),
         Rule::AtMostOne(&["wrap", "wrap_u"]),
         Rule::AtMostOne(&["wrap", "wrap_v"]),
     ],
@@ -545,13 +612,23 @@ static ENVIRONMENT: Object = Object {
         may(
             "image",
             Kind::Name,
-            "Latitude-longitude image; +y is up, its centre is +z",
+            "Image of all directions; +y is up, its centre is +z",
+        ),
+        may(
+            "mapping",
+            Kind::Choice(&["latlong", "mirrored_ball", "angular", "vertical_cross"]),
+            "How the image shows the directions (latlong)",
         ),
         may("scale", Kind::Spectrum, "Factor on the image (1)"),
-        may("transform", Kind::Transform, "Image to world: a rotation"),
+        may(
+            "transform",
+            Kind::Transform,
+            "Image to world: a rotation, or one that mirrors",
+        ),
     ],
     rules: &[
         Rule::ExactlyOne(&["radiance", "image"]),
+        Rule::Needs("mapping", "image"),
         Rule::Needs("scale", "image"),
         Rule::Needs("transform", "image"),
     ],
@@ -688,6 +765,39 @@ static RECTANGLE_LIGHT: Object = Object {
     rules: &[],
 };
 
+static SHAPING: Object = Object {
+    name: "shaping",
+    help: "A factor on emission: a cone about an axis, and tint + (1 - tint) |cos|^focus of the angle from it",
+    fields: &[
+        need(
+            "axis",
+            Kind::Vec3,
+            "Direction in which most is emitted, in world or in the prototype's space",
+        ),
+        may(
+            "angle_deg",
+            Kind::Number(Range::above(0.0, 360.0)),
+            "Full angle of the cone in degrees; 360 is none (360)",
+        ),
+        may(
+            "softness",
+            Kind::Number(Range::closed(0.0, 1.0)),
+            "Share of the cone's half angle over which the emission falls to 0 as a smoothstep of the angle (0)",
+        ),
+        may(
+            "focus",
+            Kind::Number(Range::closed(0.0, 1e6)),
+            "Power of the cosine (0)",
+        ),
+        may(
+            "focus_tint",
+            Kind::Spectrum,
+            "Factor that remains where the power of the cosine is 0: one number or RGB (0)",
+        ),
+    ],
+    rules: &[],
+};
+
 const MATERIAL_NAME: Field = may("material", Kind::Name, "Name of a material");
 const EMISSION: Field = may(
     "emission",
@@ -700,6 +810,11 @@ const EMISSION_TEXTURE: Field = may(
     "Name of a texture that the emission is multiplied with",
 );
 const TWO_SIDED: Field = may("two_sided", Kind::Bool, "Emits from both sides (false)");
+const SHAPING_KEY: Field = may(
+    "shaping",
+    Kind::Object(&SHAPING),
+    "Directions that the emission favours",
+);
 const INTERIOR: Field = may(
     "interior",
     Kind::Name,
@@ -721,12 +836,14 @@ static SPHERE: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -749,12 +866,14 @@ static RECTANGLE: Object = Object {
         EMISSION,
         EMISSION_TEXTURE,
         TWO_SIDED,
+        SHAPING_KEY,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission"]),
         Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -768,12 +887,14 @@ static DISK: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -791,12 +912,14 @@ static CYLINDER: Object = Object {
         MATERIAL_NAME,
         EMISSION,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
     rules: &[
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -812,11 +935,22 @@ static MESH: Object = Object {
         ),
         may("normals", Kind::Vec3s, "One shading normal per corner"),
         may("uvs", Kind::Pairs, "One texture coordinate per corner"),
+        may(
+            "colors",
+            Kind::Colors,
+            "One linear RGB or RGBA per corner, for textures with vertex_color",
+        ),
+        may(
+            "tangents",
+            Kind::Fours,
+            "Direction of growing u per corner, and a sign: -1 where v grows on the other side",
+        ),
         TO_WORLD,
         MATERIAL_NAME,
         EMISSION,
         EMISSION_TEXTURE,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
@@ -824,6 +958,7 @@ static MESH: Object = Object {
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 
@@ -839,13 +974,25 @@ static GLTF: Object = Object {
             "Name of a material in place of the model's",
         ),
         may(
+            "emission",
+            Kind::Spectrum,
+            "Radiance emitted from the outer side in place of the model's: one number or RGB",
+        ),
+        EMISSION_TEXTURE,
+        TWO_SIDED,
+        SHAPING_KEY,
+        may(
             "interior",
             Kind::Name,
             "Name of a medium in place of the model's",
         ),
         PRIORITY,
     ],
-    rules: &[],
+    rules: &[
+        Rule::Needs("emission_texture", "emission"),
+        Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
+    ],
 };
 
 static PLY: Object = Object {
@@ -862,6 +1009,7 @@ static PLY: Object = Object {
         EMISSION,
         EMISSION_TEXTURE,
         TWO_SIDED,
+        SHAPING_KEY,
         INTERIOR,
         PRIORITY,
     ],
@@ -869,6 +1017,7 @@ static PLY: Object = Object {
         Rule::AtLeastOne(&["material", "emission", "interior"]),
         Rule::Needs("emission_texture", "emission"),
         Rule::Needs("two_sided", "emission"),
+        Rule::Needs("shaping", "emission"),
     ],
 };
 

@@ -54,6 +54,7 @@ mod plugin;
 mod read;
 mod read_texture;
 mod schema;
+pub mod table;
 mod texture;
 mod transform;
 mod write;

@@ -14,6 +14,7 @@ use crate::format::{Kind, SCENE, VERSION};
 use crate::json::{Data, Document, Member, Node, quoted};
 use crate::nearest::hint;
 use crate::plugin::{Param, PluginBlock, Value};
+use crate::texture::{self, MAPPINGS};
 use crate::transform::{Transform, cross, length, parallel, sub};
 
 impl Scene {
@@ -220,9 +221,18 @@ impl Reader<'_> {
         let focus_distance = focus_distance.unwrap_or(1.0);
         Some(Camera {
             pose,
-            fov_x_deg: number(node, "fov_x_deg")?,
+            projection: match text(node, "type")? {
+                "orthographic" => Projection::Orthographic {
+                    width: number(node, "width")?,
+                },
+                _ => Projection::Perspective {
+                    fov_x_deg: number(node, "fov_x_deg")?,
+                },
+            },
             lens_radius,
             focus_distance,
+            shift: node.get("shift").and_then(floats).unwrap_or_default(),
+            exposure: number(node, "exposure").unwrap_or(0.0),
         })
     }
 
@@ -262,14 +272,14 @@ impl Reader<'_> {
         )?;
         let aovs = list(node, "aovs")
             .iter()
-            .filter_map(|n| {
-                Aov::ALL
-                    .into_iter()
-                    .find(|a| matches!(&n.data, Data::Text(t) if &**t == a.name()))
+            .filter_map(|n| match &n.data {
+                Data::Text(t) => Aov::parse(t),
+                _ => None,
             })
             .collect();
         Some(Film {
             resolution,
+            pixel_aspect: number(node, "pixel_aspect").unwrap_or(1.0),
             crop,
             filter,
             aovs,
@@ -298,10 +308,13 @@ impl Reader<'_> {
                     radiance: spectrum(node, "radiance")?,
                 },
                 Some(image) => {
-                    let rotation = self.rotation(node)?;
+                    let rotation = self.rotation(node, true)?;
                     let scale = spectrum(node, "scale").unwrap_or([1.0; 3]);
                     Environment::Image {
                         file: image.into(),
+                        mapping: text(node, "mapping")
+                            .and_then(|w| texture::named(&MAPPINGS, w))
+                            .unwrap_or_default(),
                         scale,
                         rotation,
                     }
@@ -327,7 +340,7 @@ impl Reader<'_> {
                 scale: spectrum(node, "scale").unwrap_or([1.0; 3]),
                 sun: flag(node, "sun").unwrap_or(true),
                 sun_angle_deg: number(node, "sun_angle_deg").unwrap_or(0.533),
-                rotation: self.rotation(node)?,
+                rotation: self.rotation(node, false)?,
             },
             "spot" => {
                 let angle_deg = number(node, "angle_deg")?;
@@ -387,10 +400,11 @@ impl Reader<'_> {
         Some(to_sun)
     }
 
-    /// A transform that must be a rotation.
-    fn rotation(&mut self, node: &Node) -> Option<Transform> {
+    /// A transform that must be a rotation, or may mirror besides.
+    fn rotation(&mut self, node: &Node, mirrors: bool) -> Option<Transform> {
         let rotation = to_world(node)?;
-        if let (Some(at), Some(fault)) = (node.get("transform"), rotation.rotation_fault()) {
+        let fault = rotation.rotation_fault(mirrors);
+        if let (Some(at), Some(fault)) = (node.get("transform"), fault) {
             self.checker
                 .report(at, format!("expected a rotation, found {fault}"));
         }
@@ -461,11 +475,25 @@ impl Reader<'_> {
             emission: spectrum(node, "emission"),
             emission_texture: text(node, "emission_texture").map(String::from),
             two_sided: flag(node, "two_sided").unwrap_or(false),
+            shaping: match node.get("shaping") {
+                Some(n) => Some(self.shaping(n)?),
+                None => None,
+            },
             interior: text(node, "interior").map(String::from),
             priority: match node.get("priority") {
                 Some(n) => self.checker.doc.integer(n)?.try_into().ok()?,
                 None => 0,
             },
+        })
+    }
+
+    fn shaping(&mut self, node: &Node) -> Option<Shaping> {
+        Some(Shaping {
+            axis: self.direction(node, "axis")?,
+            angle_deg: number(node, "angle_deg").unwrap_or(360.0),
+            softness: number(node, "softness").unwrap_or(0.0),
+            focus: number(node, "focus").unwrap_or(0.0),
+            focus_tint: spectrum(node, "focus_tint").unwrap_or_default(),
         })
     }
 
@@ -487,6 +515,14 @@ impl Reader<'_> {
                 .iter()
                 .map(floats)
                 .collect::<Option<_>>()?,
+            colors: list(node, "colors")
+                .iter()
+                .map(|n| floats(n).or_else(|| floats(n).map(|[r, g, b]| [r, g, b, 1.0])))
+                .collect::<Option<_>>()?,
+            tangents: list(node, "tangents")
+                .iter()
+                .map(floats)
+                .collect::<Option<_>>()?,
             transform: to_world(node)?,
         };
         let corners = mesh.positions.len();
@@ -504,7 +540,12 @@ impl Reader<'_> {
                 );
             }
         }
-        for (key, count) in [("normals", mesh.normals.len()), ("uvs", mesh.uvs.len())] {
+        for (key, count) in [
+            ("normals", mesh.normals.len()),
+            ("uvs", mesh.uvs.len()),
+            ("colors", mesh.colors.len()),
+            ("tangents", mesh.tangents.len()),
+        ] {
             if let Some(at) = node.get(key)
                 && count != corners
             {
@@ -608,6 +649,7 @@ fn instance(node: &Node) -> Option<Instance> {
     Some(Instance {
         prototype: text(node, "prototype")?.into(),
         transform: to_world(node)?,
+        transforms: text(node, "transforms").map(String::from),
         material: text(node, "material").map(String::from),
     })
 }
@@ -639,7 +681,7 @@ pub(crate) fn number(node: &Node, key: &str) -> Option<f64> {
     }
 }
 
-fn flag(node: &Node, key: &str) -> Option<bool> {
+pub(crate) fn flag(node: &Node, key: &str) -> Option<bool> {
     match node.get(key)?.data {
         Data::Bool(b) => Some(b),
         _ => None,

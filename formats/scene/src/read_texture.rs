@@ -6,7 +6,7 @@ use crate::base64;
 use crate::describe::Material;
 use crate::json::{Node, quoted};
 use crate::nearest::hint;
-use crate::read::{Reader, floats, number, spectrum, text};
+use crate::read::{Reader, flag, floats, number, spectrum, text};
 use crate::texture::*;
 
 impl Reader<'_> {
@@ -24,7 +24,8 @@ impl Reader<'_> {
                     bytes: bytes.into(),
                 })
             }
-            (None, None) => return None,
+            // The check asks for one of the three.
+            (None, None) => ImageSource::White,
         };
         let wrap = |key: &str| {
             let word = text(node, key).or_else(|| text(node, "wrap"));
@@ -42,6 +43,7 @@ impl Reader<'_> {
             });
         Some(Texture {
             image,
+            vertex_color: flag(node, "vertex_color").unwrap_or(false),
             color_space: text(node, "color_space")
                 .and_then(|w| named(&COLOR_SPACES, w))
                 .unwrap_or_default(),

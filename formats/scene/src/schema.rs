@@ -74,8 +74,9 @@ impl Builder<'_> {
             }
             Kind::Text => json!({"type": "string"}),
             Kind::Name => json!({"type": "string", "minLength": 1}),
-            Kind::Choices(names) => {
-                json!({"type": "array", "items": {"enum": names}, "uniqueItems": true})
+            Kind::Layers(names, _) => {
+                let orders = json!({"type": "string", "pattern": "^orders:[0-9]{1,2}$"});
+                json!({"type": "array", "items": {"anyOf": [{"enum": names}, orders]}, "uniqueItems": true})
             }
             Kind::Choice(names) => json!({"enum": names}),
             Kind::Pair => numbers(2, COORDINATE),
@@ -83,6 +84,10 @@ impl Builder<'_> {
             Kind::Vec3 => numbers(3, COORDINATE),
             Kind::Vec3s => json!({"type": "array", "items": numbers(3, COORDINATE)}),
             Kind::Pairs => json!({"type": "array", "items": numbers(2, COORDINATE)}),
+            Kind::Fours => json!({"type": "array", "items": numbers(4, COORDINATE)}),
+            Kind::Colors => json!({
+                "type": "array", "items": {"anyOf": [numbers(3, POWER), numbers(4, POWER)]},
+            }),
             Kind::Triangles => {
                 let triangle = self.kind(&Kind::Integers(3, 0, u64::from(u32::MAX)));
                 json!({"type": "array", "items": triangle})

@@ -3,20 +3,23 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::describe::Vec3;
+use crate::describe::{Mapping, Vec3};
 use crate::error::Place;
 
 /// An image and how it is read at texture coordinates (u, v). The image covers the unit square: (0, 0) is its lower left
 /// corner and (1, 1) its upper right one.
 ///
 /// A value is found in this order: coordinates are transformed ([`Texture::uv`]), wrapped into the image and texels
-/// interpolated, each decoded to linear values first; then [`Texture::channel`] picks one, which becomes red, green
+/// interpolated, each decoded to linear values first; with [`Texture::vertex_color`] they are multiplied with the colour and
+/// opacity that the mesh has at the point; then [`Texture::channel`] picks one, which becomes red, green
 /// and blue; then it is multiplied with [`Texture::scale`] and [`Texture::bias`] is added. Parameters that take one
 /// number take red. The parameter's declared range bounds the outcome: what lies outside is clamped to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
     /// Where the image is.
     pub image: ImageSource,
+    /// Multiplied with the mesh's colours, see [`crate::Mesh::colors`]; shapes without any are white.
+    pub vertex_color: bool,
     /// What its numbers mean.
     pub color_space: ColorSpace,
     /// What lies beyond its edges, across and up.
@@ -40,6 +43,7 @@ impl Texture {
     pub fn new(image: ImageSource) -> Texture {
         Texture {
             image,
+            vertex_color: false,
             color_space: ColorSpace::Auto,
             wrap: [Wrap::Repeat; 2],
             filter: TextureFilter::Bilinear,
@@ -55,10 +59,14 @@ impl Texture {
 /// Where an image is. PNG, JPEG, OpenEXR and Radiance HDR are read; what it is, its first bytes say.
 #[derive(Clone, PartialEq)]
 pub enum ImageSource {
-    /// A file, as the scene names it; see [`crate::Scene::resolve`].
+    /// A file, as the scene names it; see [`crate::Scene::resolve`]. `<UDIM>` in its name stands for the numbers of tiles that
+    /// lie side by side: the unit square whose lower left corner is (i, j), 0 ≤ i < 10, shows the file with the number
+    /// 1001 + i + 10 j, and nothing (0) if there is none. Between tiles nothing is interpolated.
     File(String),
     /// The bytes of an image file.
     Memory(MemoryImage),
+    /// None: white everywhere, for colours of vertices alone.
+    White,
 }
 
 /// The bytes of an image file, held in memory and shared.
@@ -81,6 +89,7 @@ impl fmt::Debug for ImageSource {
         match self {
             ImageSource::File(file) => write!(f, "{file:?}"),
             ImageSource::Memory(image) => image.fmt(f),
+            ImageSource::White => f.write_str("white"),
         }
     }
 }
@@ -107,6 +116,8 @@ pub enum Wrap {
     Clamp,
     /// Its mirror image.
     Mirror,
+    /// Nothing: 0 in all channels, before factor and offset.
+    Black,
 }
 
 /// What lies between the middles of texels.
@@ -179,10 +190,11 @@ pub(crate) const COLOR_SPACES: [(&str, ColorSpace); 4] = [
     ("linear", ColorSpace::Linear),
     ("raw", ColorSpace::Linear),
 ];
-pub(crate) const WRAPS: [(&str, Wrap); 3] = [
+pub(crate) const WRAPS: [(&str, Wrap); 4] = [
     ("repeat", Wrap::Repeat),
     ("clamp", Wrap::Clamp),
     ("mirror", Wrap::Mirror),
+    ("black", Wrap::Black),
 ];
 pub(crate) const FILTERS: [(&str, TextureFilter); 2] = [
     ("bilinear", TextureFilter::Bilinear),
@@ -193,6 +205,13 @@ pub(crate) const CHANNELS: [(&str, TextureChannel); 4] = [
     ("g", TextureChannel::Green),
     ("b", TextureChannel::Blue),
     ("a", TextureChannel::Alpha),
+];
+
+pub(crate) const MAPPINGS: [(&str, Mapping); 4] = [
+    ("latlong", Mapping::LatLong),
+    ("mirrored_ball", Mapping::MirroredBall),
+    ("angular", Mapping::Angular),
+    ("vertical_cross", Mapping::VerticalCross),
 ];
 
 /// What a word stands for.

@@ -127,7 +127,7 @@ impl Transform {
     }
 
     /// Why this is no rotation, if it is none. Rotations written with six digits are accepted.
-    pub(crate) fn rotation_fault(&self) -> Option<String> {
+    pub(crate) fn rotation_fault(&self, mirrors: bool) -> Option<String> {
         let rows = self.linear();
         for i in 0..3 {
             for j in 0..3 {
@@ -136,7 +136,7 @@ impl Transform {
                 }
             }
         }
-        if self.determinant() < 0.0 {
+        if !mirrors && self.determinant() < 0.0 {
             return Some("a reflection".into());
         }
         if (0..3).any(|i| self.0[i][3] != 0.0) {
@@ -229,18 +229,22 @@ mod tests {
     fn rotations_are_told_from_the_rest() {
         assert!(
             Transform::rotate_deg([1.0, 2.0, -0.5], 33.0)
-                .rotation_fault()
+                .rotation_fault(false)
                 .is_none()
         );
-        assert!(Transform::scale([1.0, 1.0, 1.1]).rotation_fault().is_some());
+        assert!(
+            Transform::scale([1.0, 1.0, 1.1])
+                .rotation_fault(false)
+                .is_some()
+        );
         assert!(
             Transform::scale([1.0, 1.0, -1.0])
-                .rotation_fault()
+                .rotation_fault(false)
                 .is_some()
         );
         assert!(
             Transform::translate([1.0, 0.0, 0.0])
-                .rotation_fault()
+                .rotation_fault(false)
                 .is_some()
         );
     }

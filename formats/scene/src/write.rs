@@ -67,6 +67,11 @@ impl Scene {
                 rebase.path(file);
             }
         }
+        for instance in &mut self.instances {
+            if let Some(file) = &mut instance.transforms {
+                rebase.path(file);
+            }
+        }
         rebase.block(&mut self.integrator);
         for texture in self.textures.values_mut() {
             if let ImageSource::File(file) = &mut texture.image {
@@ -193,7 +198,10 @@ fn put_transform(out: &mut Json, t: &Transform) {
 }
 
 fn camera(c: &Camera) -> Json {
-    let mut out = json!({"type": "perspective"});
+    let mut out = match c.projection {
+        Projection::Perspective { .. } => json!({"type": "perspective"}),
+        Projection::Orthographic { .. } => json!({"type": "orthographic"}),
+    };
     match &c.pose {
         Pose::LookAt { origin, target, up } => {
             out["origin"] = json!(origin);
@@ -202,14 +210,28 @@ fn camera(c: &Camera) -> Json {
         }
         Pose::Transform(t) => out["transform"] = json!(t.0),
     }
-    out["fov_x_deg"] = json!(c.fov_x_deg);
-    out["lens_radius"] = json!(c.lens_radius);
-    out["focus_distance"] = json!(c.focus_distance);
+    match c.projection {
+        Projection::Perspective { fov_x_deg } => {
+            out["fov_x_deg"] = json!(fov_x_deg);
+            out["lens_radius"] = json!(c.lens_radius);
+            out["focus_distance"] = json!(c.focus_distance);
+        }
+        Projection::Orthographic { width } => out["width"] = json!(width),
+    }
+    if c.shift != [0.0; 2] {
+        out["shift"] = json!(c.shift);
+    }
+    if c.exposure != 0.0 {
+        out["exposure"] = json!(c.exposure);
+    }
     out
 }
 
 fn film(f: &Film) -> Json {
     let mut out = json!({"resolution": f.resolution});
+    if f.pixel_aspect != 1.0 {
+        out["pixel_aspect"] = json!(f.pixel_aspect);
+    }
     if let Some(crop) = f.crop {
         out["crop"] = json!(crop);
     }
@@ -221,7 +243,7 @@ fn film(f: &Film) -> Json {
         }
     };
     if !f.aovs.is_empty() {
-        out["aovs"] = f.aovs.iter().map(|a| a.name()).collect();
+        out["aovs"] = f.aovs.iter().map(|a| a.to_string()).collect();
     }
     out
 }
@@ -243,10 +265,14 @@ fn light(l: &Light) -> Json {
         }
         Light::Environment(Environment::Image {
             file,
+            mapping,
             scale,
             rotation,
         }) => {
             let mut out = json!({"type": "environment", "image": file, "scale": spectrum(*scale)});
+            if *mapping != Mapping::default() {
+                out["mapping"] = json!(word(&MAPPINGS, *mapping));
+            }
             put_transform(&mut out, rotation);
             out
         }
@@ -332,7 +358,11 @@ fn texture(t: &Texture) -> Json {
     let mut out = match &t.image {
         ImageSource::File(file) => json!({"file": file}),
         ImageSource::Memory(image) => json!({"data": base64::encode(&image.bytes)}),
+        ImageSource::White => json!({}),
     };
+    if t.vertex_color || t.image == ImageSource::White {
+        out["vertex_color"] = json!(t.vertex_color);
+    }
     out["color_space"] = json!(word(&COLOR_SPACES, t.color_space));
     let [u, v] = t.wrap.map(|w| word(&WRAPS, w));
     if u == v {
@@ -399,6 +429,12 @@ fn shape(s: &Shape) -> Json {
             if !m.uvs.is_empty() {
                 out["uvs"] = json!(m.uvs);
             }
+            if !m.colors.is_empty() {
+                out["colors"] = json!(m.colors);
+            }
+            if !m.tangents.is_empty() {
+                out["tangents"] = json!(m.tangents);
+            }
             put_transform(&mut out, &m.transform);
             out
         }
@@ -424,6 +460,12 @@ fn shape(s: &Shape) -> Json {
         if s.two_sided {
             out["two_sided"] = json!(true);
         }
+        if let Some(s) = s.shaping {
+            out["shaping"] = json!({
+                "axis": s.axis, "angle_deg": s.angle_deg, "softness": s.softness,
+                "focus": s.focus, "focus_tint": spectrum(s.focus_tint),
+            });
+        }
     }
     if let Some(interior) = &s.interior {
         out["interior"] = json!(interior);
@@ -437,6 +479,9 @@ fn shape(s: &Shape) -> Json {
 fn instance(i: &Instance) -> Json {
     let mut out = json!({"prototype": i.prototype});
     put_transform(&mut out, &i.transform);
+    if let Some(file) = &i.transforms {
+        out["transforms"] = json!(file);
+    }
     if let Some(material) = &i.material {
         out["material"] = json!(material);
     }

@@ -107,6 +107,16 @@ fn keys_and_names() {
         r#"full.json:12:23: $.film.aovs[1]: unknown name "albedos"; did you mean "albedo"?"#,
     );
     expect(
+        "\"samples\", \"orders:4\"",
+        "\"samples\", \"orders:4.5\"",
+        r#"full.json:12:66: $.film.aovs[5]: "orders:4.5" is no layer; orders are asked for as "orders:N", N from 0 to 99"#,
+    );
+    expect(
+        "\"samples\", \"orders:4\"",
+        "\"orders:3\", \"orders:4\"",
+        r#"full.json:12:64: $.film.aovs[5]: "orders:4" is named twice"#,
+    );
+    expect(
         "\"interior\": \"fog\"},\n    {\"type\": \"rectangle\"",
         "\"interior\": \"frog\"},\n    {\"type\": \"rectangle\"",
         r#"full.json:40:70: $.shapes[0].interior: no medium is named "frog"; did you mean "fog"?"#,
@@ -119,22 +129,22 @@ fn keys_and_names() {
     expect(
         "{\"prototype\": \"stone\"}",
         "{\"prototype\": \"stoone\"}",
-        r#"full.json:57:19: $.instances[0].prototype: no prototype is named "stoone"; did you mean "stone"?"#,
+        r#"full.json:58:19: $.instances[0].prototype: no prototype is named "stoone"; did you mean "stone"?"#,
     );
     expect(
         "{\"prototype\": \"stone\"}",
         "{\"prototype\": \"stone\", \"transfrom\": []}",
-        r#"full.json:57:28: $.instances[0].transfrom: instance has no key "transfrom"; did you mean "transform"?"#,
+        r#"full.json:58:28: $.instances[0].transfrom: instance has no key "transfrom"; did you mean "transform"?"#,
     );
     expect(
         "[5, 0, 0]}], \"material\": \"floor\"}",
         "[5, 0, 0]}], \"material\": \"foor\"}",
-        r#"full.json:58:104: $.instances[1].material: no material is named "foor"; did you mean "floor"?"#,
+        r#"full.json:59:104: $.instances[1].material: no material is named "foor"; did you mean "floor"?"#,
     );
     expect(
         "\"file\": \"stone.ply\", \"material\": \"floor\"",
         "\"file\": \"stone.ply\", \"material\": \"flor\"",
-        r#"full.json:52:56: $.prototypes.stone[0].material: no material is named "flor"; did you mean "floor"?"#,
+        r#"full.json:53:56: $.prototypes.stone[0].material: no material is named "flor"; did you mean "floor"?"#,
     );
     expect(
         "\"spp\": 128",
@@ -238,12 +248,12 @@ fn numbers_and_shapes() {
     expect(
         "\"scale\": [1, -2, 3]",
         "\"scale\": [1, 0, 3]",
-        "full.json:58:41: $.instances[1].transform: expected a transform that can be inverted, found a matrix that cannot be inverted (determinant 0e0)",
+        "full.json:59:41: $.instances[1].transform: expected a transform that can be inverted, found a matrix that cannot be inverted (determinant 0e0)",
     );
     expect(
         "\"priority\": 3",
         "\"priority\": 1.5",
-        "full.json:53:93: $.prototypes.stone[1].priority: expected a whole number in [-1000000, 1000000], found 1.5",
+        "full.json:54:93: $.prototypes.stone[1].priority: expected a whole number in [-1000000, 1000000], found 1.5",
     );
     expect(
         "[[0, 0], [1, 0], [0, 1]]",

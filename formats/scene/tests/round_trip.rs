@@ -25,13 +25,15 @@ fn every_key_arrives() {
     );
     assert_eq!(
         (
-            s.camera.fov_x_deg,
+            s.camera.projection,
             s.camera.lens_radius,
             s.camera.focus_distance
         ),
-        (44.0, 0.05, 9.5)
+        (Projection::Perspective { fov_x_deg: 44.0 }, 0.05, 9.5)
     );
+    assert_eq!((s.camera.shift, s.camera.exposure), ([0.25, -0.1], -1.5));
     assert_eq!(s.film.resolution, [320, 200]);
+    assert_eq!(s.film.pixel_aspect, 1.5);
     assert_eq!(s.film.window(), [10, 20, 300, 180]);
     assert_eq!(
         s.film.filter,
@@ -40,7 +42,9 @@ fn every_key_arrives() {
             sigma: 0.6
         }
     );
-    assert_eq!(s.film.aovs, Aov::ALL);
+    assert_eq!(s.film.aovs[..5], Aov::NAMED);
+    assert_eq!(s.film.aovs[5..], [Aov::Orders(4)]);
+    assert_eq!(s.film.order_layers(), 6);
     assert_eq!(
         s.sampling,
         Sampling {
@@ -63,6 +67,7 @@ fn every_key_arrives() {
     );
     let Light::Environment(Environment::Image {
         file,
+        mapping,
         scale,
         rotation,
     }) = &s.lights[0]
@@ -70,6 +75,7 @@ fn every_key_arrives() {
         panic!()
     };
     assert_eq!((file.as_str(), *scale), ("sky.exr", [1.0, 0.9, 0.8]));
+    assert_eq!(*mapping, Mapping::Angular);
     assert!((rotation.vector([0.0, 0.0, 1.0])[0] - 0.5).abs() < 1e-12);
     assert_eq!(
         s.lights[1],
@@ -174,9 +180,11 @@ fn every_key_arrives() {
         Instance {
             prototype: "stone".into(),
             transform: Transform::IDENTITY,
+            transforms: None,
             material: None
         }
     );
+    assert_eq!(s.instances[2].transforms.as_deref(), Some("stones.npy"));
     assert_eq!(s.instances[1].material.as_deref(), Some("floor"));
     let moved = s.instances[1].transform.point([1.0; 3]);
     assert_eq!(moved, [6.0, -2.0, 3.0]);
@@ -267,8 +275,25 @@ fn a_description_that_breaks_the_rules_is_not_written() {
         "{error}"
     );
     scene.lights.clear();
-    scene.camera.fov_x_deg = 180.0;
+    scene.camera.projection = Projection::Perspective { fov_x_deg: 180.0 };
     assert!(scene.to_text().is_err());
+    scene.camera.projection = Projection::Orthographic { width: 0.0 };
+    assert!(scene.to_text().is_err());
+}
+
+#[test]
+fn parallel_rays() {
+    let text = LEAST
+        .replace("perspective", "orthographic")
+        .replace("fov_x_deg", "width");
+    let scene = parse(&text);
+    let width = 40.0;
+    assert_eq!(scene.camera.projection, Projection::Orthographic { width });
+    assert_eq!(parse(&scene.to_text().unwrap()), scene);
+    // A lens is of perspective cameras.
+    let wrong = text.replace("\"width\"", "\"lens_radius\": 1, \"width\"");
+    let error = Scene::parse(wrong.as_bytes(), "a.json").unwrap_err();
+    assert!(error.to_string().contains("lens_radius"), "{error}");
 }
 
 #[test]
@@ -290,6 +315,7 @@ fn large_meshes_are_written_line_by_line() {
         emission: Some([1.0; 3]),
         emission_texture: None,
         two_sided: false,
+        shaping: None,
         interior: None,
         priority: 0,
     };
@@ -297,6 +323,59 @@ fn large_meshes_are_written_line_by_line() {
     let text = scene.to_text().unwrap();
     assert!(text.lines().all(|l| l.len() < 120));
     assert_eq!(scene, parse(&text));
+}
+
+/// Colours and tangents of vertices, and the textures that use them.
+#[test]
+fn colours_of_vertices() {
+    let text = r#"{
+      "resolvent": 1,
+      "camera": {"type": "perspective", "origin": [0, 0, 9], "target": [0, 0, 0], "fov_x_deg": 40},
+      "textures": {
+        "paint": {"vertex_color": true, "scale": 0.5},
+        "wood": {"file": "wood.png", "vertex_color": true}
+      },
+      "materials": {"m": {"plugin": "diffuse", "params": {"reflectance": {"texture": "paint"}}}},
+      "shapes": [{
+        "type": "mesh", "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "indices": [[0, 1, 2]],
+        "colors": [[1, 0, 0], [0, 1, 0, 0.5], [0, 0, 4]],
+        "tangents": [[1, 0, 0, 1], [1, 0, 0, 1], [1, 0, 0, -1]], "material": "m"
+      }]
+    }"#;
+    let scene = parse(text);
+    let Geometry::Mesh(mesh) = &scene.shapes[0].geometry else {
+        panic!()
+    };
+    assert_eq!(mesh.colors[0], [1.0, 0.0, 0.0, 1.0]);
+    assert_eq!(mesh.colors[1], [0.0, 1.0, 0.0, 0.5]);
+    assert_eq!(mesh.tangents[2], [1.0, 0.0, 0.0, -1.0]);
+    let paint = &scene.textures["paint"];
+    assert!(paint.vertex_color && paint.image == ImageSource::White);
+    assert!(scene.textures["wood"].vertex_color);
+    assert_eq!(scene, parse(&scene.to_text().unwrap()));
+    for (good, bad, error) in [
+        (
+            "[0, 0, 4]]",
+            "[0, 0]]",
+            "three numbers (RGB) or four (RGBA)",
+        ),
+        (
+            ", [0, 0, 4]]",
+            "]",
+            "expected one per position (3), found 2",
+        ),
+        (
+            "\"vertex_color\": true, \"scale\"",
+            "\"scale\"",
+            "vertex_color",
+        ),
+    ] {
+        let text = text.replacen(good, bad, 1);
+        let found = Scene::parse(text.as_bytes(), "a.json")
+            .unwrap_err()
+            .to_string();
+        assert!(found.contains(error), "{found}");
+    }
 }
 
 #[test]

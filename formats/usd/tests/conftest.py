@@ -67,7 +67,7 @@ class Converted:
             m = matrix @ np.array(shape.get("transform", np.eye(4)))
             if shape["type"] == "gltf":
                 out.append(moved(self.mesh(shape)["POSITION"], m))
-            elif shape["type"] == "sphere":
+            elif shape["type"] == "sphere" and "emission" not in shape:
                 out.append(sphere_box(m, shape["center"], shape["radius"]))
         return np.concatenate(out)
 

@@ -177,7 +177,7 @@ def test_cameras_and_render_settings(tmp_path: Path) -> None:
     assert np.allclose(camera["transform"], np.eye(4))
     assert main([str(stage), "-o", str(out), "--camera", "/parallel"]) == 0
     camera = json.loads(out.read_text())["camera"]
-    assert camera["type"] == "orthographic" and camera["width"] == pytest.approx(2.5 * 4 * 2.5 / 5)
+    assert camera["type"] == "orthographic" and camera["width"] == pytest.approx(2.5 * 4)
 
 
 @pytest.mark.parametrize(

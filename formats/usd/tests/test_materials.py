@@ -166,6 +166,25 @@ def test_primvars(tmp_path: Path) -> None:
     assert surface(tmp_path, connect, reader.format("none"))[0]["params"]["base_color"] == [1, 0, 0]
 
 
+def test_colours_at_corners(tmp_path: Path) -> None:
+    """displayColor that varies is read corner by corner; any other primvar that varies by its mean, which is said."""
+    reader = 'def Shader "p" {{ uniform token info:id = "UsdPrimvarReader_float3"; string inputs:varname = "{}"; float3 outputs:result }}'
+    connect = "color3f inputs:diffuseColor.connect = </m/p.outputs:result>"
+    colors = 'color3f[] primvars:{} = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)] (\n interpolation = "vertex"\n)\n rel material'
+    quad = QUAD.replace("rel material", colors.format("displayColor") .replace("rel material", colors.format("other")))
+    shader = 'def Shader "s" {{ uniform token info:id = "UsdPreviewSurface"; {}; token outputs:surface }}'.format(connect)
+    for name, exact in (("displayColor", True), ("other", False)):
+        body = f'def Material "m" {{ token outputs:surface.connect = </m/s.outputs:surface>; {shader}; {reader.format(name)} }}'
+        converted = stage(tmp_path, quad + lines(body))
+        (shape,) = converted.scene["shapes"]
+        color = converted.scene["materials"][shape["material"]]["params"]["base_color"]
+        if exact:
+            assert converted.scene["textures"][color["texture"]] == {"vertex_color": True}
+            assert "COLOR_0" in converted.mesh(shape) and converted.losses("/q") == []
+        else:
+            assert color == 0.5 and any("other" in x for x in converted.losses("/q"))
+
+
 def test_what_has_no_effect_is_said(tmp_path: Path) -> None:
     _, converted = surface(tmp_path, "float inputs:displacement = 0.5; float inputs:occlusion = 0.5; float inputs:frobnication = 1")
     losses = " ".join(converted.losses("/m/s"))
@@ -217,7 +236,8 @@ def test_open_pbr(tmp_path: Path) -> None:
         tmp_path,
         "color3f inputs:base_color = (0.5, 0.4, 0.3); float inputs:base_weight = 0.5; float inputs:transmission_weight = 1; color3f inputs:transmission_color = (0.9, 1, 0.9); "
         "float inputs:specular_ior = 1.33; bool inputs:geometry_thin_walled = 1; float inputs:emission_luminance = 10; float inputs:geometry_opacity = 0.5; "
-        "float inputs:base_diffuse_roughness = 0.3",
+        "float inputs:base_diffuse_roughness = 0.3; float inputs:coat_weight = 0.5; color3f inputs:coat_color = (1, 0.5, 0.5); "
+        "float inputs:base_metalness = 0.5; color3f inputs:specular_color = (0.5, 0.75, 1); color3f inputs:thin_film_weight = (1, 1, 1)",
         kind="ND_open_pbr_surface_surfaceshader",
     )
     assert material["plugin"] == "mask" and material["params"]["opacity"] == 0.5
@@ -225,7 +245,9 @@ def test_open_pbr(tmp_path: Path) -> None:
     assert params["base_color"] == pytest.approx([0.25, 0.2, 0.15]) and params["thin"] is True and params["transmission"] == 1
     assert params["transmission_color"] == pytest.approx([0.9, 1, 0.9]) and params["ior"] == pytest.approx(1.33)
     assert converted.scene["shapes"][0]["emission"] == [10, 10, 10]
-    assert any("base_diffuse_roughness" in x for x in converted.losses("/m/s"))
+    assert params["diffuse_roughness"] == pytest.approx(0.3) and params["clearcoat_color"] == [1, 0.5, 0.5] and params["clearcoat_darkening"] == 1
+    assert params["edge_color"] == params["specular_color"] == [0.5, 0.75, 1] and params["clearcoat_ior"] == pytest.approx(1.6)
+    assert any("thin_film_weight" in x for x in converted.losses("/m/s"))
 
 
 def mats(*names: str) -> str:

@@ -179,6 +179,27 @@ def test_equal_meshes_share_a_file(convert_text) -> None:
     assert len(contents) == 1
 
 
+@pytest.mark.parametrize("kind", ["uniform", "vertex", "faceVarying"])
+def test_display_colors_of_corners(convert_text, kind: str) -> None:
+    count = {"uniform": 2, "vertex": 6, "faceVarying": 8}[kind]
+    colors = [(round(0.1 * k, 3), 0.5, 1.0) for k in range(count)]
+    found = convert_text(
+        f'def Mesh "m" {{ {QUADS} color3f[] primvars:displayColor = {colors} (interpolation = "{kind}"); '
+        f'float[] primvars:displayOpacity = [0.5]; }} '
+    )
+    (mesh,) = found.meshes()
+    for k, triangle in enumerate(mesh["triangles"]):
+        for corner in triangle:
+            x, y, _ = mesh["POSITION"][corner]
+            point, face = int(x + 3 * y), k // 2
+            at = {"uniform": face, "vertex": point, "faceVarying": 4 * face + CORNERS[4 * face : 4 * face + 4].index(point)}[kind]
+            assert np.allclose(mesh["COLOR_0"][corner], [*colors[at], 0.5])
+    material = found.scene["materials"][found.scene["shapes"][0]["material"]]
+    names = [material["params"]["opacity"]["texture"], material["params"]["bsdf"]["params"]["reflectance"]["texture"]]
+    assert [found.scene["textures"][n] for n in names] == [{"vertex_color": True, "channel": "a"}, {"vertex_color": True}]
+    assert {x.what for x in found.report.losses} == {"camera"}
+
+
 def test_display_color(convert_text) -> None:
     found = convert_text(
         f'def Mesh "m" {{ {QUADS} color3f[] primvars:displayColor = [(1, 0.5, 0)]; float[] primvars:displayOpacity = [0.25]; }} '

@@ -111,10 +111,24 @@ def test_semi_sharp_crease_by_hand() -> None:
     assert np.allclose(half, 0.5 * (smooth + sharp))
     # Sharpness 1 is sharp for one level and smooth from then on.
     one = subdivide.step(cage(CUBE, FACES, loop(1), [1.0] * 4))
-    assert np.allclose(one.data, sharp) and len(one.crease_edges) == 0
+    assert np.allclose(one.data, sharp) and not one.known.sharpness.any()
     # 1.5: sharp, then half.
     two = subdivide.step(cage(CUBE, FACES, loop(1), [1.5] * 4))
-    assert np.allclose(two.data, sharp) and np.allclose(two.crease_sharpness, 0.5) and len(two.crease_edges) == 8
+    assert np.allclose(two.data, sharp) and sorted(two.known.sharpness)[-9:] == [0] + [0.5] * 8
+
+
+def test_edges_are_those_of_the_faces() -> None:
+    """The edges that a level hands on are the ones that a search finds."""
+    points, faces = grid(4)
+    mixed = [*faces[1:], [0, 1, 5], [0, 5, 4]]
+    for mesh in (cage(CUBE, FACES, loop(1), [2.5] * 4), cage(points, mixed)):
+        fine = subdivide.step(subdivide.step(mesh))
+        known = fine.known
+        following = subdivide._next(fine.counts)
+        ends = np.sort(np.stack([fine.indices, fine.indices[following]], axis=1), axis=1)
+        assert np.array_equal(np.sort(known.ends[known.of_corner], axis=1), ends)
+        assert len(np.unique(ends, axis=0)) == len(known.ends)
+        assert np.array_equal(np.bincount(known.of_corner), known.faces)
 
 
 def test_darts_and_corners() -> None:

@@ -72,6 +72,13 @@ def test_all_volumes_of_a_stage(tmp_path: Path) -> None:
     assert any("motion blur" in x for x in converted.losses("/World/fire"))
 
 
+def test_a_camera_that_is_placed_sees_volumes(tmp_path: Path) -> None:
+    """Even if no extent is authored: the fire lies some ten units from the origin."""
+    move = 'double3 xformOp:translate = (10, 0, 0)\n uniform token[] xformOpOrder = ["xformOp:translate"]'
+    camera = stage(tmp_path, volume({"density": field("density", "density")}, move)).scene["camera"]
+    assert np.allclose(camera["target"], [12.75, -3, 1.875], atol=0.01)
+
+
 def test_variants_set_the_density(tmp_path: Path) -> None:
     source = DATA / "own" / "cloud_volume.usda"
     for variant, sigma in (("thick", 40), ("thin", 2)):

@@ -112,10 +112,13 @@ fn renders_go_on() {
 #[test]
 fn what_differs_is_named() {
     let at = folder("differs");
-    let base = ["--resolution", "24x16", "--spp", "16", "--checkpoint"];
+    let base = ["--spp", "16", "--checkpoint"];
+    let size = ["--resolution", "24x16"];
     let input = |name: &str| scene(name).to_string_lossy().into_owned();
     let keep = |input: &str, file: &str, more: &[&str]| {
-        let args = [&["render", input, "-q"], &base[..], &[file], more].concat();
+        let given = more.contains(&size[0]);
+        let size = if given { &[] } else { &size[..] };
+        let args = [&["render", input, "-q"], size, &base[..], &[file], more].concat();
         Run::new(&at, args)
     };
     let overlap = input("overlap/overlap.json");

@@ -61,6 +61,8 @@ fn wrong_options() {
         (&["--error", "-1"], &["--error"]),
         (&["--exposure", "inf"], &["--exposure"]),
         (&["--aov", "depht"], &["depht", "depth"]),
+        (&["--aov", "orders"], &["orders:N", "99"]),
+        (&["--aov", "orders:100"], &["orders:N", "99"]),
         (&["--tone-map", "aces"], &["aces", "filmic"]),
         (&["--nonsense"], &["--nonsense"]),
         (&["--grid", "density"], &["--grid", "VDB files"]),

@@ -14,4 +14,5 @@ mod skips;
 mod stats;
 mod textures;
 mod tools;
+mod usd;
 mod volume;

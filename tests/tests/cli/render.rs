@@ -133,6 +133,54 @@ fn a_window_is_a_part_of_the_whole() {
     }
 }
 
+/// Layers by scattering order leave the picture as it is, bit for bit, and sum to it: up to the rounding to f32 of each layer and
+/// of the picture, 2⁻²⁴ relative.
+#[test]
+fn orders_sum_to_the_picture() {
+    let at = folder("orders");
+    let size = ["--resolution", "40x30", "--spp", "16"];
+    for (name, integrator) in [
+        // Branches towards the sun; chromatic fog around glass; media that overlap.
+        ("bench/cloud_sun.json", "pt"),
+        ("caustic/caustic.json", "bdpt"),
+        ("overlap/overlap.json", "light"),
+        ("pinhole/pinhole.json", "mlt"),
+        ("overlap/overlap.json", "bdpt"),
+    ] {
+        let with = ["--integrator", integrator];
+        let plain = render(&at, &scene(name), "plain.exr", &[&size[..], &with].concat());
+        let aov = ["--aov", "orders:2"];
+        let options = [&size[..], &with, &aov].concat();
+        let image = render(&at, &scene(name), "orders.exr", &options);
+        for (k, channel) in ["R", "G", "B"].into_iter().enumerate() {
+            let of = |layer: &str| {
+                let found = image.channel(layer, channel);
+                found.unwrap_or_else(|| panic!("no {layer}.{channel}"))
+            };
+            let beauty = of(BEAUTY);
+            assert_eq!(Some(beauty), plain.channel(BEAUTY, channel), "{name} {k}");
+            let layers = ["order0", "order1", "order2", "order_rest"].map(of);
+            for (i, whole) in beauty.iter().enumerate() {
+                let values = layers.map(|l| f64::from(l[i]));
+                let sum: f64 = values.iter().sum();
+                let size: f64 = values.iter().map(|v| v.abs()).sum();
+                let whole = f64::from(*whole);
+                assert!(
+                    (sum - whole).abs() <= 2f64.powi(-24) * (size + whole.abs()) * 1.001,
+                    "{name} {integrator} {channel} {i}: {sum} {whole}"
+                );
+            }
+            // No light reaches the room behind the pinhole by one scattering: the others' layers all show something.
+            let lit = |l: &[f32]| l.iter().any(|v| *v > 0.0);
+            let first = if integrator == "mlt" { 3 } else { 1 };
+            assert!(
+                layers[first..].iter().all(|l| lit(l)),
+                "{name} {integrator}"
+            );
+        }
+    }
+}
+
 #[test]
 fn layers_and_metadata() {
     let at = folder("layers");

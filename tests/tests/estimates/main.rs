@@ -54,6 +54,7 @@ impl Shot {
             goal,
             seed,
             features: false,
+            orders: 0,
         };
         let (scene, stop) = (&self.scene, AtomicBool::new(false));
         render(scene, &self.integrator, &settings, &stop, &|_| {})
@@ -70,7 +71,7 @@ impl Shot {
 struct Calibration {
     /// Share of pixels and lanes whose 95 % interval covers the truth.
     pixels: f64,
-    /// Share of pictures whose mean's interval covers the truth, over lanes.
+    /// Share of pictures whose interval of the mean covers the truth, over lanes.
     means: f64,
     /// Mean square of the true relative error over that of the stated one.
     error: f64,
@@ -100,6 +101,9 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
         }
     }
     let level = pixel_means.iter().flatten().sum::<f64>() / (3 * shot.pixels()) as f64;
+    // The picture is one tile, or even enough to be taken for one.
+    let mean_of = |k: usize| pixel_means.iter().map(|m| m[k]).sum::<f64>();
+    let level_of_tile = [0, 1, 2].map(|k| mean_of(k) / shot.pixels() as f64);
     let (mut sum_of_variance, mut sum_of_squares) = (0.0, 0.0);
     for (i, truth) in pixel_means.iter().enumerate() {
         for r in &all {
@@ -107,10 +111,13 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
             let variance = e.variance.unwrap_or_else(|| panic!("no variance"));
             for k in 0..3 {
                 let off = (e.mean[k] - truth[k]) * n / (n - 1.0);
-                let half = student(f64::from(e.degrees)) * variance[k].sqrt();
-                covered += f64::from(u8::from(off.abs() <= half * widening.sqrt()));
+                let half = student(e.degrees[k]) * variance[k].sqrt();
+                // Pixels without noise, of a constant sky, differ by rounding alone.
+                let rounding = 1e-12 * truth[k].abs();
+                covered += f64::from(u8::from(off.abs() <= half * widening.sqrt() + rounding));
                 tested += 1.0;
-                true_error += off * off / widening / (truth[k] * truth[k] + 0.01 * level * level);
+                let mean = level_of_tile[k];
+                true_error += off * off / widening / (mean * mean + 0.01 * level * level);
                 sum_of_variance += variance[k];
                 sum_of_squares += off * off / widening;
             }
@@ -142,40 +149,52 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     }
 }
 
-/// 95 % intervals of 200 renders cover the truth 93 to 97 % of the time, pixel by pixel and for the whole picture, and the stated error
-/// is the true one; where tails are so heavy that this cannot be, the picture says so.
+/// What 200 renders say of their errors is true on average, with light tails and heavy ones, and 95 % intervals cover the truth: pixel by
+/// pixel 93 to 97 % of the time where values are smooth. In fog and in a cloud the values of a net are skewed, and 88 to 89 %
+/// are covered: such pictures doubt their error. The picture's mean is covered as it should, but for the cloud (91 %), whose sun has
+/// the heaviest tails.
 #[test]
 fn intervals_cover_the_truth() {
     // Net by net: 64 samples are four of 16; smooth surfaces, fog, a cloud in the sun, walks from both ends, chains.
-    let scenes: [(&str, &str, u32); 5] = [
-        ("bench/surface_only.json", "pt", 64),
-        ("bench/surface_only.json", "pt", 256),
-        ("bench/box_fog.json", "pt", 128),
-        ("bench/cloud_sun.json", "pt", 64),
-        ("lampshade/lampshade.json", "bdpt", 64),
+    let scenes: [(&str, &str, u32, [f64; 2]); 5] = [
+        ("bench/surface_only.json", "pt", 64, [0.93, 0.97]),
+        ("bench/surface_only.json", "pt", 256, [0.93, 0.97]),
+        ("bench/box_fog.json", "pt", 128, [0.86, 0.97]),
+        ("bench/cloud_sun.json", "pt", 64, [0.86, 0.97]),
+        ("lampshade/lampshade.json", "bdpt", 64, [0.9, 0.97]),
     ];
-    for (name, integrator, samples) in scenes {
+    for (name, integrator, samples, pixels) in scenes {
         let begin = std::time::Instant::now();
         let shot = Shot::new(name, integrator, [8, 6]);
         let samples = samples * if full() { 4 } else { 1 };
         let c = calibrate(&shot, 200, samples);
         println!("{name} {integrator} {samples}: {c:?} {:?}", begin.elapsed());
+        // Of 200 pictures 1.5 % is the standard error of a share of 95 %, more with heavy tails.
+        assert!((0.89..=1.0).contains(&c.means), "{name}: {c:?}");
+        assert!((pixels[0]..pixels[1]).contains(&c.pixels), "{name}: {c:?}");
+        // Small nets are the noisier ones: with nets of two sizes the variance is overstated where they help.
+        assert!((0.75..1.15).contains(&c.variance), "{name}: {c:?}");
+        assert!((0.75..1.15).contains(&c.error), "{name}: {c:?}");
+        if pixels[0] < 0.9 {
+            assert!(c.doubtful > 0.9, "{name}: {c:?}");
+        }
     }
 }
 
-/// Caustics found by chance: whatever the picture says of its error is wrong, and it says that as well.
+/// Caustics found by chance: fewer pixels are covered (80 %), and the picture says so.
 #[test]
 fn heavy_tails_are_told() {
-    let shot = Shot::new("caustic/caustic.json", "pt", [24, 16]);
+    let shot = Shot::new("caustic/caustic.json", "pt", [16, 16]);
     let c = calibrate(&shot, 24, 64);
     println!("{c:?}");
+    assert!(c.doubtful > 0.5, "{c:?}");
 }
 
 /// Adaptive renders have the mean of uniform ones, tile by tile.
 #[test]
 fn adaptive_means_are_not_biased() {
     let shot = Shot::new("bench/cloud_sun.json", "pt", [20, 12]);
-    let seeds: u64 = if full() { 200 } else { 24 };
+    let seeds: u64 = if full() { 200 } else { 12 };
     let goal = 0.3;
     let mean = |r: &Rendered| -> f64 {
         let all = (0..shot.pixels()).map(|i| r.film.estimate(i).mean[0]);
@@ -198,4 +217,64 @@ fn adaptive_means_are_not_biased() {
     let z = (a.mean() - b.mean()) / a.standard_error().hypot(b.standard_error());
     println!("{} {} z {z}", a.mean(), b.mean());
     assert!(z.abs() < 3.5, "{z}");
+}
+
+/// Largest relative error of a tile, root mean square over its pixels, by the spread of renders with different seeds.
+fn worst_tile(all: &[Rendered]) -> f64 {
+    let n = all.len() as f64;
+    let film = &all[0].film;
+    let [w, h] = film.size();
+    let count = (w * h) as usize;
+    let estimates: Vec<Vec<f64>> = all
+        .iter()
+        .map(|r| (0..count).map(|i| r.film.estimate(i).mean[0]).collect())
+        .collect();
+    let level = estimates.iter().flatten().sum::<f64>() / n / count as f64;
+    let square = |i: usize| {
+        let m = Moments::of(estimates.iter().map(|e| e[i]));
+        let variance = m.standard_error().powi(2) * n;
+        variance / (m.mean() * m.mean() + 0.01 * level * level)
+    };
+    let window = [0, 0, w, h];
+    film.tiles()
+        .map(|t| t.indices(window).map(square).sum::<f64>() / t.pixels() as f64)
+        .fold(0.0, f64::max)
+        .sqrt()
+}
+
+/// Samples go where the error is: for the same largest error of a tile, as it is and not as it is stated, `--error` takes fewer
+/// samples than a uniform render.
+#[test]
+fn adaptive_sampling_pays() {
+    // The larger the picture, the more tiles are easy.
+    let (size, seeds, goal, least) = if full() {
+        ([128, 96], 4, 0.12, 1.5)
+    } else {
+        ([48, 32], 4, 0.12, 1.1)
+    };
+    let shot = Shot::new("bench/cloud_sun.json", "pt", size);
+    let many = |first: u64, samples: u32, goal: Goal| -> Vec<Rendered> {
+        let seeds = (first..first + seeds).into_par_iter();
+        seeds.map(|s| shot.render(s, samples, goal)).collect()
+    };
+    let mean_samples = |all: &[Rendered]| -> f64 {
+        let of = |r: &Rendered| {
+            (0..shot.pixels())
+                .map(|i| f64::from(r.film.estimate(i).samples))
+                .sum::<f64>()
+        };
+        all.iter().map(of).sum::<f64>() / (all.len() * shot.pixels()) as f64
+    };
+    let adaptive = many(1, 1 << 20, Goal::Error(goal));
+    let uniform = many(100, 64, Goal::Samples);
+    let (a, u) = (worst_tile(&adaptive), worst_tile(&uniform));
+    // A uniform render's variance falls as the inverse of its samples.
+    let needed = 64.0 * (u / a).powi(2);
+    let gain = needed / mean_samples(&adaptive);
+    println!(
+        "goal {goal}: worst tile {a:.4} with {:.0} spp; uniform needs {needed:.0}: {gain:.2} times",
+        mean_samples(&adaptive)
+    );
+    assert!(a < 1.25 * goal, "{a}");
+    assert!(gain > least, "{gain}");
 }

@@ -19,7 +19,7 @@ const FILES: [&str; 10] = [
 ];
 
 /// Constants that C gets from the preamble, or has no use for.
-const DROPPED: [&str; 4] = ["MAGIC", "SYMBOL", "LANES", "TABLE"];
+const DROPPED: [&str; 5] = ["MAGIC", "SYMBOL", "LANES", "TABLE", "WITH_MEDIA"];
 
 /// All structures, and constants named by their path.
 pub fn sources(folder: &Path, types: &[(&str, &str)]) -> String {

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use resolvent_api::{Affine, PluginKind};
+use resolvent_engine::film::Film;
 use resolvent_engine::plugin::{ForeignIntegrator, Registry};
 use resolvent_engine::scene::{Counters, Scene};
 use resolvent_engine::{Goal, Rendered, Settings, render};
@@ -110,6 +111,7 @@ pub struct Ready {
     scene: Scene,
     integrator: ForeignIntegrator,
     resolution: [u32; 2],
+    orders: usize,
 }
 
 /// Builds what a JSON scene describes.
@@ -119,12 +121,33 @@ pub struct Ready {
 pub fn build(scene: &Value) -> Result<Ready, String> {
     let text = serde_json::to_vec_pretty(scene).map_err(|e| e.to_string())?;
     let described = resolvent_scene::Scene::parse(&text, "test.json").map_err(|e| e.to_string())?;
-    let scene = Scene::build(&described, registry()).map_err(|e| e.to_string())?;
+    build_described(&described)
+}
+
+/// An example scene, by its path there, with this integrator.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn open(path: &str, integrator: &str) -> Ready {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../scenes")
+        .join(path);
+    let ready = resolvent_scene::Scene::read(&file)
+        .map_err(|e| e.to_string())
+        .and_then(|mut described| {
+            described.integrator = resolvent_scene::PluginBlock::new(integrator);
+            build_described(&described)
+        });
+    ready.unwrap_or_else(|e| panic!("{path}: {e}"))
+}
+
+fn build_described(described: &resolvent_scene::Scene) -> Result<Ready, String> {
+    let scene = Scene::build(described, registry()).map_err(|e| e.to_string())?;
     let instance = registry()
         .instantiate(
             PluginKind::Integrator,
             &described.integrator,
-            &described,
+            described,
             &Affine::IDENTITY,
             scene.lanes,
         )
@@ -134,6 +157,7 @@ pub fn build(scene: &Value) -> Result<Ready, String> {
         scene,
         integrator,
         resolution: described.film.resolution,
+        orders: described.film.order_layers(),
     })
 }
 
@@ -155,6 +179,7 @@ impl Ready {
             goal: Goal::Samples,
             seed,
             features: false,
+            orders: self.orders,
         };
         let rendered = render(
             &self.scene,
@@ -169,6 +194,14 @@ impl Ready {
         rendered
     }
 
+    /// Mean radiance of pixel `i`; of a scene with layers by scattering order, in the last that has one order alone.
+    fn radiance(&self, film: &Film, i: usize) -> [f64; 3] {
+        match self.orders {
+            0 => film.estimate(i).mean,
+            n => film.order(i, n - 2),
+        }
+    }
+
     /// The mean over all pixels of samples `begin` to `end`, and its standard error by the spread of the pixels, which are
     /// independent.
     pub fn measure_range(&self, seed: u64, begin: u32, end: u32) -> Measured {
@@ -178,7 +211,7 @@ impl Ready {
         let mut out = Measured::default();
         for i in 0..count {
             let e = rendered.film.estimate(i);
-            for (moments, mean) in lanes.iter_mut().zip(e.mean) {
+            for (moments, mean) in lanes.iter_mut().zip(self.radiance(&rendered.film, i)) {
                 moments.add(mean);
             }
             out.alpha += e.alpha / count as f64;

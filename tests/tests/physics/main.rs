@@ -15,8 +15,11 @@ mod scenes;
 
 mod instances;
 mod lights;
+mod limits;
 mod materials;
 mod nested;
+mod orders;
+mod peers;
 mod points;
 mod slab_flux;
 mod slab_radiance;

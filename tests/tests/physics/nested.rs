@@ -248,7 +248,7 @@ fn cut_outs() {
                 let d = d.map(|x| x / length);
                 let mut scene = scenes::scene(*o, d);
                 // Only what is not scattered at all is kept.
-                scene["integrator"]["params"] = json!({ "orders": 0 });
+                scenes::scattered(&mut scene, 0);
                 scenes::add(&mut scene, "lights", scenes::dome(1.0));
                 let medium = |s: f64| json!({ "sigma_t": s, "albedo": albedo });
                 scenes::medium(&mut scene, "block", medium(block));

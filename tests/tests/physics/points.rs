@@ -41,7 +41,7 @@ fn point_light_once() {
         let [a, s] = ["sigma_a", "sigma_s"].map(|k| number(e, k));
         let (origin, d) = (vector(e, "ray_origin"), unit(vector(e, "ray_direction")));
         let mut scene = scenes::scene(origin, d);
-        scene["integrator"]["params"] = json!({ "orders": 1 });
+        scenes::scattered(&mut scene, 1);
         let radius = 30.0 / (a + s) + 7.0;
         scenes::medium(
             &mut scene,
@@ -75,7 +75,7 @@ fn sphere_once() {
     for e in list(&table, "sphere") {
         let [a, s, g] = ["sigma_a", "sigma_s", "g"].map(|k| number(e, k));
         let mut scene = scenes::scene(vector(e, "ray_origin"), vector(e, "ray_direction"));
-        scene["integrator"]["params"] = json!({ "orders": 1 });
+        scenes::scattered(&mut scene, 1);
         let ball = scenes::ball(vector(e, "centre"), number(e, "radius"), a, s, g);
         scenes::medium(&mut scene, "ball", ball);
         let beam = scenes::beam(vector(e, "light_direction"), number(e, "E_perp"));

@@ -31,6 +31,12 @@ pub fn camera(origin: [f64; 3], direction: [f64; 3], fov: f64) -> Value {
     json!({ "type": "perspective", "origin": origin, "target": target, "up": up, "fov_x_deg": fov })
 }
 
+/// Light scattered exactly `n` times is all that is measured: the layer of that order.
+pub fn scattered(scene: &mut Value, n: u32) {
+    scene["integrator"]["params"] = json!({ "max_depth": n });
+    scene["film"]["aovs"] = json!([format!("orders:{n}")]);
+}
+
 /// Adds to a list of the scene.
 pub fn add(scene: &mut Value, list: &str, what: Value) {
     match scene[list].as_array_mut() {

@@ -81,7 +81,8 @@ fn slab_radiance() {
     run("slab_radiance", &cases);
 }
 
-/// Light scattered exactly n times. Default part: every eighth value by a hash of the name, of those above 0.003.
+/// Light scattered exactly n times: the layer of that order, by `pt`, and for a quarter of the values by `bdpt` as well. Default
+/// part: every eighth value by a hash of the name, of those above 0.003.
 ///
 /// Left out always: values below 2e-4 and the slab of optical thickness 1e-6, where one path in a million collides.
 #[test]
@@ -104,7 +105,13 @@ fn slab_orders() {
                     }
                     let mut scene =
                         seen(e, "beam_direction", vector(v, &format!("exit_dir_{side}")));
-                    scene["integrator"]["params"] = json!({ "orders": n });
+                    scenes::scattered(&mut scene, n);
+                    if full() || hash(&name).is_multiple_of(32) {
+                        let mut scene = scene.clone();
+                        scene["integrator"]["plugin"] = json!("bdpt");
+                        let name = format!("{name}, bdpt");
+                        cases.push(Case { name, scene, exact });
+                    }
                     cases.push(Case { name, scene, exact });
                 }
             }

@@ -55,7 +55,7 @@ fn lights_and_media() {
         let mut s = scenes::scene([0.4, 0.1, 2.0], [0.0, 0.0, -1.0]);
         scenes::medium(&mut s, "m", fog(1.0));
         scenes::add(&mut s, "lights", point([0.0, 0.0, z], 1.0));
-        s["integrator"]["params"] = json!({ "orders": 1 });
+        scenes::scattered(&mut s, 1);
         measure(
             &s,
             &format!("light at {z}"),

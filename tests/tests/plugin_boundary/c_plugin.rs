@@ -98,7 +98,7 @@ fn layouts_agree() {
             "kind" = kind, "count" = count, "numbers" = numbers, "text" = text, "header" = header, "instance" = instance
         },
         "host": HostTable {
-            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture
+            "ctx" = ctx, "log" = log, "fail" = fail, "parallel_for" = parallel_for, "texture" = texture, "texture_at" = texture_at
         },
         "create_args": CreateArgs { "params" = params, "host" = host, "to_world" = to_world, "lanes" = lanes },
         "scatter_draws": ScatterDraws {},
@@ -110,7 +110,8 @@ fn layouts_agree() {
         "closure": Closure {},
         "medium_point": MediumPoint { "lanes" = lanes },
         "surface_point": SurfacePoint {
-            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior
+            "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior,
+            "color" = color
         },
         "phase_table": PhaseTable { "create" = create, "closure" = closure },
         "bsdf_table": BsdfTable { "traits" = traits, "closure" = closure, "ior" = ior },

@@ -159,6 +159,7 @@ pub fn walk(mode: &str) -> Value {
 pub struct Ready {
     scene: Scene,
     integrator: ForeignIntegrator,
+    orders: usize,
 }
 
 /// The description, as if read from a file in the sources of these tests.
@@ -183,7 +184,11 @@ pub fn ready(scene: &Value, registry: &Registry) -> Result<Ready, String> {
         )
         .map_err(|e| e.to_string())?;
     let integrator = ForeignIntegrator::new(instance).map_err(|e| e.to_string())?;
-    Ok(Ready { scene, integrator })
+    Ok(Ready {
+        scene,
+        integrator,
+        orders: described.film.order_layers(),
+    })
 }
 
 /// Renders `samples` per pixel.
@@ -196,6 +201,7 @@ pub fn picture(scene: &Value, registry: &Registry, samples: u32) -> Result<Pictu
         goal: Goal::Samples,
         seed: 1,
         features: false,
+        orders: ready.orders,
     };
     let stop = AtomicBool::new(false);
     match render(&ready.scene, &ready.integrator, &settings, &stop, &|_| {}) {

@@ -33,6 +33,29 @@ fn broken() {
     }
 }
 
+/// Layers that an integrator knows nothing of are not left black.
+#[test]
+fn layers_by_order_are_not_faked() {
+    let mut s = walk("none");
+    s["film"]["aovs"] = serde_json::json!(["orders:2"]);
+    let f = fault(&s);
+    let words = ["does not tell light by scattering order"];
+    blames(&f.text, "integrator", &build::unruly("integrator"), &words);
+    assert!(f.kept.is_none());
+}
+
+/// Layers that leave out some of the light, or have more.
+#[test]
+fn layers_by_order_must_sum_to_the_picture() {
+    for mode in ["forgets an order", "counts an order twice"] {
+        let mut s = walk(mode);
+        s["film"]["aovs"] = serde_json::json!(["orders:2"]);
+        let words = ["told of the light 1 by scattering order, but its sum is"];
+        let f = fault(&s);
+        blames(&f.text, "integrator", &build::unruly("integrator"), &words);
+    }
+}
+
 /// What was finished before stays.
 #[test]
 fn earlier_passes_are_kept() {

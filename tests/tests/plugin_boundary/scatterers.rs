@@ -2,6 +2,7 @@
 
 use crate::build;
 use crate::drive::{blames, fault, haze, picture, registry, says, wall};
+use serde_json::json;
 
 #[test]
 fn without_a_mode_they_render() {
@@ -97,4 +98,36 @@ fn lobes_that_panic() {
             "unruly as asked: lobes",
         ],
     );
+}
+
+/// A reverse density that is not the one of the opposite direction makes weights wrong that no picture shows: integrators that
+/// recompute their paths find it, and say where.
+#[test]
+fn a_wrong_reverse_density_is_found() {
+    for (integrator, params) in [
+        ("bdpt", json!({ "verify": true })),
+        ("bdpt", json!({ "verify": true, "media_weights": "depth" })),
+        ("mlt", json!({ "verify": true })),
+    ] {
+        let corner = |mode: &str| {
+            let mut s = wall(mode);
+            let mut second = s["shapes"][0].clone();
+            second["edge_u"] = json!([0, 0, -1]);
+            s["shapes"].as_array_mut().unwrap().push(second);
+            s["lights"] = json!([{ "type": "rectangle", "corner": [0.2, 0.4, -0.9], "edge_u": [0, 0.2, 0],
+                                   "edge_v": [0.2, 0, 0], "radiance": 3, "two_sided": true }]);
+            s["integrator"] = json!({ "plugin": integrator, "params": params });
+            s
+        };
+        picture(&corner("none"), &registry(), 32).unwrap_or_else(|f| panic!("{}", f.text));
+        let text = fault(&corner("reverse density is wrong")).text;
+        let words = [
+            "verify: strategy (s ",
+            "the path x0 ",
+            "the density of x",
+            "recomputed",
+        ];
+        says(&text, &words);
+        assert!(text.contains(&format!("'{integrator}'")), "{text}");
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::SMOOTH_BELOW;
 use super::energy::Width;
+use super::exits::{self, Exits};
 use super::fresnel;
 use super::ggx::{Ggx, reflect};
 use crate::math::{Vec3, warp};
@@ -111,6 +112,19 @@ impl Interface {
         if self.thin { 1.0 } else { self.eta }
     }
 
+    /// How what passes from below is spread over the cosines above, see [`exits::passing`]; `None` if nothing is bent that way.
+    pub fn passing(&self) -> Option<Exits> {
+        let bends = !self.thin && !self.smooth && self.eta >= 1.0;
+        bends.then(|| exits::passing(self.width.isotropic(), 1.0 / self.eta))
+    }
+
+    /// Share of the light from `w`, below a rough boundary, that passes.
+    pub fn passes(&self, w: Vec3) -> f32 {
+        let back = 1.0 / self.eta;
+        let total = self.width.total(w, back);
+        total - self.width.reflected(w, back) + (1.0 - self.reflects[1]) * (1.0 - total)
+    }
+
     /// Share of the light from `w` that is reflected, about: for choosing between this and other lobes.
     pub fn reflected(&self, w: Vec3) -> f32 {
         let eta = if w.z < 0.0 && !self.thin {
@@ -122,7 +136,7 @@ impl Interface {
             fresnel::dielectric(w.z.abs(), eta).0
         } else {
             let side = usize::from(w.z < 0.0);
-            let once = self.width.reflected(w.z.abs(), eta);
+            let once = self.width.reflected(w, eta);
             once + self.reflects[side] * self.lost(w, eta)
         };
         self.wall(f.min(1.0))

@@ -3,14 +3,18 @@
 //!
 //! All directions are in the shading frame and point away from the surface; the facets' normal `h` has z > 0.
 
+pub mod boundary;
 pub mod energy;
+pub mod exits;
 pub mod fresnel;
 mod ggx;
-pub mod grain;
+mod grain;
 mod interface;
 mod reflector;
 
+pub use boundary::Boundary;
 pub use ggx::Ggx;
+pub use grain::Grain;
 pub use interface::Interface;
 pub use reflector::Reflector;
 

@@ -1,6 +1,7 @@
 //! The samples of one piece of work: a rectangle of pixels, and samples of one net.
 
 use super::fixed::{add, fits, fix};
+use super::orders::Layers;
 use super::splat::Splats;
 use resolvent_api::Spectrum;
 use resolvent_api::abi::PixelSample;
@@ -41,6 +42,8 @@ pub struct Buffer {
     pub(super) samples: Range<u32>,
     pub(super) pixels: Vec<Sums>,
     pub(super) features: Vec<FeatureSums>,
+    /// Light by scattering order, if wanted.
+    pub(super) orders: Option<Layers>,
     /// Light from walks that started at lights.
     pub splats: Splats,
     /// Samples that were left out.
@@ -64,9 +67,42 @@ impl Buffer {
             } else {
                 Vec::new()
             },
+            orders: None,
             splats: Splats::default(),
             rejected: 0,
             rejected_at: None,
+        }
+    }
+
+    /// With `count` layers of light by scattering order, the last for all that was scattered more often.
+    pub fn with_orders(mut self, count: usize) -> Self {
+        self.orders = (count > 0).then(|| Layers::new(count, self.pixels.len()));
+        self
+    }
+
+    /// Number of layers of light by scattering order.
+    pub fn orders(&self) -> usize {
+        self.orders.as_ref().map_or(0, Layers::count)
+    }
+
+    /// As [`Buffer::add`], with the sample's radiance by scattering order, not yet multiplied by `exposure`.
+    pub fn add_orders(
+        &mut self,
+        x: u32,
+        y: u32,
+        s: &PixelSample,
+        layers: &[Spectrum],
+        exposure: f32,
+    ) -> Result<(), String> {
+        let rejected = self.rejected;
+        self.add(x, y, s)?;
+        let i = ((y - self.min[1]) * self.width + (x - self.min[0])) as usize;
+        match &mut self.orders {
+            // What the picture left out, its layers leave out.
+            Some(orders) if self.rejected == rejected => {
+                orders.add(i, s.radiance, layers, exposure)
+            }
+            _ => Ok(()),
         }
     }
 
@@ -110,6 +146,7 @@ impl Buffer {
     /// The radiance alone.
     pub(crate) fn bare(mut self) -> Self {
         self.features = Vec::new();
+        self.orders = None;
         self.splats = Splats::default();
         self
     }

@@ -3,7 +3,11 @@
 use super::tile::tile_mean;
 use super::{Estimate, Film, tile};
 
-/// Relative errors: square roots of the mean over pixels and lanes of variance/(mean² + 0.01 m²), m the picture's mean.
+/// Relative errors: of a tile the square root of the mean over its pixels and lanes of variance/(M² + 0.01 m²), with M the tile's
+/// mean of the lane and m the picture's mean; of the picture, the root of the mean of their squares over all pixels.
+///
+/// A pixel's variance is not divided by its own mean: where bright light is rare, pixels that have met it have both large, and their
+/// quotient would hide how noisy they are. So the squares are all but unbiased, whatever the tails.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Errors {
     /// Of the picture.
@@ -45,17 +49,14 @@ impl Film {
 
     /// Estimated relative errors; `None` before all pixels have two nets.
     pub fn errors(&self) -> Option<Errors> {
-        let floor = self.floor();
+        let of = |i| self.estimate(i);
+        let floor = floor((0..self.pixels.len()).map(of));
         let (mut sum, mut squares, mut worst) = (0.0, 0.0, 0f64);
         for t in self.tiles() {
-            let mut in_tile = 0.0;
-            for i in t.indices(self.window) {
-                let x = self.pixel_error(i, floor)?;
-                in_tile += x;
-                squares += x * x;
-            }
-            sum += in_tile;
-            worst = worst.max(in_tile / t.pixels() as f64);
+            let x = Square::of(t.indices(self.window).map(of), floor)?;
+            sum += x.sum;
+            squares += x.squares;
+            worst = worst.max(x.mean());
         }
         let n = self.pixels.len().max(1) as f64;
         let mean = sum / n;
@@ -71,29 +72,15 @@ impl Film {
         })
     }
 
-    /// What is added to the squares of means, so that black pixels do not count without bound.
-    fn floor(&self) -> f64 {
-        floor((0..self.pixels.len()).map(|i| self.estimate(i)))
-    }
-
-    /// Mean over lanes of the squares of a pixel's errors.
-    fn pixel_error(&self, i: usize, floor: f64) -> Option<f64> {
-        square(&self.estimate(i), floor)
-    }
-
-    /// As `floor`, of this half alone.
+    /// 0.01 m², by this half alone.
     pub(crate) fn half_floor(&self) -> f64 {
         floor((0..self.pixels.len()).map(|i| self.half_estimate(i)))
     }
 
     /// Square of the relative error of a tile by this half alone; `None` before it has two nets.
     pub(crate) fn half_error(&self, tile: usize, floor: f64) -> Option<f64> {
-        let rect = tile::rect(self.window, tile);
-        let mut sum = 0.0;
-        for i in rect.indices(self.window) {
-            sum += square(&self.half_estimate(i), floor)?;
-        }
-        Some(sum / rect.pixels() as f64)
+        let pixels = tile::rect(self.window, tile).indices(self.window);
+        Square::of(pixels.map(|i| self.half_estimate(i)), floor).map(|x| x.mean())
     }
 
     /// The picture's mean and its interval, by the spread of the tiles' nets: walks of one tile that light many pixels, or share
@@ -133,6 +120,7 @@ impl Film {
     }
 }
 
+/// What is added to the squares of means, so that black tiles do not count without bound.
 fn floor(pixels: impl ExactSizeIterator<Item = Estimate>) -> f64 {
     let n = pixels.len().max(1) as f64;
     let m = pixels
@@ -142,16 +130,42 @@ fn floor(pixels: impl ExactSizeIterator<Item = Estimate>) -> f64 {
     0.01 * m * m
 }
 
-/// Mean over lanes of variance/(mean² + floor).
-fn square(e: &Estimate, floor: f64) -> Option<f64> {
-    let mut sum = 0.0;
-    for (v, mean) in e.variance?.into_iter().zip(e.mean) {
-        let scale = mean * mean + floor;
-        if v > 0.0 && scale > 0.0 {
-            sum += v / scale;
+/// Squares of the relative errors of a tile's pixels.
+struct Square {
+    sum: f64,
+    /// Sum of their squares.
+    squares: f64,
+    count: f64,
+}
+
+impl Square {
+    fn of(pixels: impl Iterator<Item = Estimate> + Clone, floor: f64) -> Option<Self> {
+        let (mut mean, mut count) = ([0.0; 3], 0.0);
+        for e in pixels.clone() {
+            count += 1.0;
+            mean = [0, 1, 2].map(|k| mean[k] + e.mean[k]);
         }
+        let scale = mean.map(|m| match (m / count) * (m / count) + floor {
+            s if s > 0.0 => 1.0 / (3.0 * s),
+            _ => 0.0,
+        });
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for e in pixels {
+            let v = e.variance?;
+            let x = v[0] * scale[0] + v[1] * scale[1] + v[2] * scale[2];
+            sum += x;
+            squares += x * x;
+        }
+        Some(Self {
+            sum,
+            squares,
+            count,
+        })
     }
-    Some(sum / 3.0)
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count
+    }
 }
 
 /// The 97.5 % quantile of Student's t: half of a 95 % interval, in standard errors. Abramowitz & Stegun 26.7.5, below three

@@ -8,6 +8,7 @@ mod buffer;
 mod coverage;
 mod error;
 mod fixed;
+mod orders;
 mod splat;
 mod store;
 mod tile;
@@ -46,6 +47,8 @@ pub struct Film {
     tiles: Vec<TileSums>,
     /// Parts of nets, by tile and first sample of the net.
     parts: BTreeMap<(usize, u32), Part>,
+    /// Light by scattering order, if wanted.
+    orders: Option<orders::Orders>,
     /// Light from walks that started at lights, once there is any.
     splats: Option<splat::Sums>,
     /// Pieces of work merged, and their samples.
@@ -66,7 +69,27 @@ pub struct Estimate {
     /// Samples taken.
     pub samples: u32,
     /// Degrees of freedom of the variance.
-    pub degrees: u32,
+    pub degrees: [f64; 3],
+}
+
+/// Variances of three lanes, and their degrees of freedom.
+type Spread = ([f64; 3], [f64; 3]);
+
+impl Estimate {
+    fn spread(&self) -> Option<Spread> {
+        self.variance.map(|v| (v, self.degrees))
+    }
+}
+
+/// The variance of a sum of two independent estimates, with its degrees of freedom (Satterthwaite 1946).
+fn sum_of(a: Option<Spread>, b: Option<Spread>) -> Option<Spread> {
+    let ((va, da), (vb, db)) = (a?, b?);
+    let variance = [0, 1, 2].map(|k| va[k] + vb[k]);
+    let degrees = [0, 1, 2].map(|k| {
+        let d = variance[k] * variance[k] / (va[k] * va[k] / da[k] + vb[k] * vb[k] / db[k]);
+        if d.is_finite() { d } else { da[k].min(db[k]) }
+    });
+    Some((variance, degrees))
 }
 
 /// One pixel's features: means over the samples that met something.
@@ -94,6 +117,7 @@ impl Film {
             },
             tiles: vec![TileSums::default(); tile::count(window)],
             parts: BTreeMap::new(),
+            orders: None,
             splats: None,
             pieces: (0, 0),
             twin: None,
@@ -106,6 +130,18 @@ impl Film {
             twin: Some(Box::new(Self::new(window, features))),
             ..Self::new(window, features)
         }
+    }
+
+    /// With `count` layers of light by scattering order, the last for all that was scattered more often; in all halves.
+    pub fn with_orders(mut self, count: usize) -> Self {
+        self.orders = (count > 0).then(|| orders::Orders::new(count, self.pixels.len()));
+        self.twin = self.twin.map(|t| Box::new(t.with_orders(count)));
+        self
+    }
+
+    /// Number of layers of light by scattering order.
+    pub fn orders(&self) -> usize {
+        self.orders.as_ref().map_or(0, |o| o.walks.count())
     }
 
     /// The first half, or the second.
@@ -164,6 +200,14 @@ impl Film {
         self.tiles[tile].coverage()
     }
 
+    /// Samples that every pixel has.
+    pub fn least_samples(&self) -> u32 {
+        (0..self.tiles.len())
+            .map(|i| self.halves().map(|h| h.tiles[i].samples()).sum())
+            .min()
+            .unwrap_or(0)
+    }
+
     /// True if walks from lights have left light.
     pub fn has_splats(&self) -> bool {
         self.halves().any(|h| h.splats.is_some())
@@ -193,7 +237,13 @@ impl Film {
             let sums = self
                 .splats
                 .get_or_insert_with(|| splat::Sums::new(self.pixels.len()));
-            part.splats = sums.add(&b.splats, self.window, filter, samples);
+            let orders = &mut self.orders;
+            let heard = |i, order, value| {
+                if let Some(orders) = orders {
+                    orders.splats.deposit(i, order, value);
+                }
+            };
+            part.splats = sums.add(&b.splats, self.window, filter, samples, heard);
             add(&mut self.tiles[tile].splats, part.splats);
         }
         self.pieces.0 += 1;
@@ -204,6 +254,9 @@ impl Film {
             q.alpha = q.alpha.wrapping_add(p.alpha);
             if let (Some(f), Some(g)) = (b.features.get(i), self.features.get_mut(at)) {
                 g.add(f);
+            }
+            if let (Some(f), Some(g)) = (&b.orders, &mut self.orders) {
+                g.walks.merge(at, f, i);
             }
         }
         self.complete(tile, net.start, part);
@@ -242,7 +295,8 @@ impl Film {
     /// # Errors
     /// If they are not parts of one picture, or have samples in common; then nothing is changed.
     pub fn join(&mut self, other: &Self) -> Result<(), String> {
-        if self.window != other.window || self.features.len() != other.features.len() {
+        let layers = |f: &Self| (f.features.len(), f.orders());
+        if self.window != other.window || layers(self) != layers(other) {
             return Err("they are not of one picture".into());
         }
         if self.twin.is_some() || other.twin.is_some() {
@@ -266,6 +320,9 @@ impl Film {
         for (a, b) in self.features.iter_mut().zip(&other.features) {
             a.add(b);
         }
+        if let (Some(a), Some(b)) = (&mut self.orders, &other.orders) {
+            a.join(b);
+        }
         if let Some(splats) = &other.splats {
             self.splats
                 .get_or_insert_with(|| splat::Sums::new(self.pixels.len()))
@@ -286,7 +343,10 @@ impl Film {
         let rect = tile::rect(self.window, tile);
         let mut out = Self::new([rect.min[0], rect.min[1], rect.max[0], rect.max[1]], false);
         out.pixels = rect.indices(self.window).map(|i| self.pixels[i]).collect();
-        out.tiles[0] = self.tiles[tile].clone();
+        let tile_sums = self.tiles[tile].clone();
+        let samples = u64::from(tile_sums.samples()) * rect.pixels() as u64;
+        out.pieces = (tile_sums.nets().into(), samples);
+        out.tiles[0] = tile_sums;
         let parts = self.parts.range((tile, 0)..(tile + 1, 0));
         out.parts = parts
             .map(|((_, net), part)| ((0, *net), part.clone()))
@@ -311,13 +371,13 @@ impl Film {
             return if own.samples == 0 { other } else { own };
         }
         let mean = |a: f64, b: f64| 0.5 * (a + b);
-        let variances = own.variance.zip(other.variance);
+        let sum = sum_of(own.spread(), other.spread());
         Estimate {
             mean: [0, 1, 2].map(|k| mean(own.mean[k], other.mean[k])),
-            variance: variances.map(|(a, b)| [0, 1, 2].map(|k| 0.25 * (a[k] + b[k]))),
+            variance: sum.map(|(v, _)| v.map(|v| 0.25 * v)),
             alpha: mean(own.alpha, other.alpha),
             samples: own.samples + other.samples,
-            degrees: own.degrees + other.degrees,
+            degrees: sum.map_or([0.0; 3], |(_, d)| d),
         }
     }
 
@@ -327,25 +387,45 @@ impl Film {
         let (samples, nets) = (tile.samples(), tile.nets());
         let n = f64::from(samples.max(1));
         let mut mean = p.sum.map(|s| float(s) / n);
-        let mut variance = (nets >= 2).then(|| {
-            [0, 1, 2].map(|lane| {
+        let degrees = f64::from(nets) - 1.0;
+        let mut spread = (nets >= 2).then(|| {
+            let variance = [0, 1, 2].map(|lane| {
                 let spread = p.squares[lane].float() - n * mean[lane] * mean[lane];
-                spread.max(0.0) / (f64::from(nets - 1) * n)
-            })
+                spread.max(0.0) / (degrees * n)
+            });
+            (variance, [degrees; 3])
         });
         if let Some(splats) = &self.splats {
             let (m, v) = splats.estimate(i, self.pieces);
             mean = [0, 1, 2].map(|lane| mean[lane] + m[lane]);
             // A pixel's own samples and what falls on it from all others' are all but independent.
-            variance = variance.zip(v).map(|(a, b)| [0, 1, 2].map(|k| a[k] + b[k]));
+            let pieces = self.pieces.0 as f64;
+            spread = sum_of(spread, v.map(|v| (v, [pieces - 1.0; 3])));
         }
         Estimate {
             mean,
-            variance,
+            variance: spread.map(|(v, _)| v),
             alpha: float(p.alpha) / n,
             samples,
-            degrees: nets.saturating_sub(1),
+            degrees: spread.map_or([0.0; 3], |(_, d)| d),
         }
+    }
+
+    /// Mean radiance of layer `k` by scattering order at pixel `i`; zero if there are no layers.
+    pub fn order(&self, i: usize, k: usize) -> [f64; 3] {
+        let tile = tile::of_pixel(self.window, i);
+        // As the picture's: halves that have not begun do not count.
+        let begun = |h: &&Self| h.tiles[tile].samples() > 0;
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        for h in self.halves().filter(begun) {
+            let Some(orders) = &h.orders else { continue };
+            let n = f64::from(h.tiles[tile].samples());
+            let (a, b) = (orders.walks.sum(i, k), orders.splats.sum(i, k));
+            let m = h.pieces.1.max(1) as f64;
+            sum = [0, 1, 2].map(|lane| sum[lane] + float(a[lane]) / n + float(b[lane]) / m);
+            count += 1.0;
+        }
+        sum.map(|v| v / f64::max(count, 1.0))
     }
 
     /// The features of pixel `i`; zero if they were not asked for.

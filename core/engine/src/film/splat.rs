@@ -7,18 +7,24 @@ use super::fixed::{Squares, add, fits, fix, float};
 use crate::filter::Filter;
 use resolvent_api::Spectrum;
 
-/// The splats of one piece of work, in order.
+/// The splats of one piece of work, in order: where, what, and how often scattered.
 #[derive(Clone, Debug, Default)]
-pub struct Splats(Vec<([f32; 2], [f32; 3])>);
+pub struct Splats(Vec<([f32; 2], [f32; 3], u32)>);
 
 impl Splats {
     /// Adds light at a position in pixels; false if it is not finite, or too large, and left out.
     #[inline]
     pub fn add(&mut self, film: [f32; 2], radiance: Spectrum) -> bool {
+        self.add_order(film, radiance, 0)
+    }
+
+    /// As [`Splats::add`], for light scattered `order` times.
+    #[inline]
+    pub fn add_order(&mut self, film: [f32; 2], radiance: Spectrum, order: u32) -> bool {
         let value = [radiance[0], radiance[1], radiance[2]];
         let good = value.iter().all(|v| fits(*v)) && film.iter().all(|v| v.is_finite());
         if good && value != [0.0; 3] {
-            self.0.push((film, value));
+            self.0.push((film, value, order));
         }
         good
     }
@@ -51,18 +57,20 @@ impl Sums {
         }
     }
 
-    /// Adds a piece of `samples` samples of a film with the given window. Returns its sum over all pixels.
+    /// Adds a piece of `samples` samples of a film with the given window; `heard` is told what each pixel gets, and its order.
+    /// Returns its sum over all pixels.
     pub fn add(
         &mut self,
         splats: &Splats,
         window: [u32; 4],
         filter: &Filter,
         samples: u64,
+        mut heard: impl FnMut(usize, u32, [i128; 3]),
     ) -> [i128; 3] {
         let [x0, y0, x1, y1] = window.map(|v| v as f32);
         let width = window[2] - window[0];
         let r = filter.radius();
-        for (film, value) in &splats.0 {
+        for (film, value, order) in &splats.0 {
             // Pixels whose centre is within the radius.
             let from = |v: f32, low: f32| (v - r - 0.5).ceil().max(low);
             let to = |v: f32, high: f32| (v + r - 0.5).floor().min(high - 1.0);
@@ -74,7 +82,9 @@ impl Sums {
                     let w = wy * filter.value(film[0] - (x + 0.5));
                     if w > 0.0 {
                         let i = (y as u32 - window[1]) * width + (x as u32 - window[0]);
-                        self.deposit(i, value.map(|v| fix(v * w)));
+                        let value = value.map(|v| fix(v * w));
+                        self.deposit(i, value);
+                        heard(i as usize, *order, value);
                     }
                     x += 1.0;
                 }
@@ -166,8 +176,8 @@ mod tests {
                 for k in 0..8 {
                     // 320 positions on 20 × 16 pixels: the samples of a film where each pixel has one.
                     let p = piece(film * 8 + k, 320);
-                    sums.add(&p, WINDOW, &filter, 320);
-                    one.add(&p, WINDOW, &filter, 320);
+                    sums.add(&p, WINDOW, &filter, 320, |_, _, _| {});
+                    one.add(&p, WINDOW, &filter, 320, |_, _, _| {});
                 }
                 let (mean, variance) = one.estimate(33, (8, 8 * 320));
                 estimates.push((mean[1], variance.unwrap()[1]));
@@ -196,7 +206,13 @@ mod tests {
         let run = |order: &[u64]| {
             let mut sums = Sums::new(80);
             for k in order {
-                sums.add(&piece(*k, 100 + *k as u32), WINDOW, &filter, 50 + k);
+                sums.add(
+                    &piece(*k, 100 + *k as u32),
+                    WINDOW,
+                    &filter,
+                    50 + k,
+                    |_, _, _| {},
+                );
             }
             (sums.sum, sums.squares)
         };

@@ -3,7 +3,7 @@
 use super::coverage::Coverage;
 use super::fixed::Squares;
 use super::tile::{self, Part};
-use super::{FeatureSums, Film, splat};
+use super::{FeatureSums, Film, orders, splat};
 use crate::checkpoint::sections::{Fields, Reader, Writer};
 use resolvent_pathspace::nets;
 use std::collections::BTreeSet;
@@ -80,6 +80,11 @@ impl Film {
                 part.pixels.iter().for_each(|p| put(out, p));
             }
         });
+        if let Some(orders) = &self.orders {
+            out.section(&format!("{prefix}orders"), |out| {
+                orders.sums().for_each(|s| put(out, s));
+            });
+        }
         if let Some(splats) = &self.splats {
             out.section(&format!("{prefix}splats"), |out| {
                 for (sum, squares) in splats.sum.iter().zip(&splats.squares) {
@@ -122,6 +127,11 @@ impl Film {
         }
         film.read_tiles(from.take(&format!("{prefix}tiles"), None)?)?;
         film.read_parts(from.take(&format!("{prefix}parts"), None)?)?;
+        let orders = format!("{prefix}orders");
+        if from.has(&orders) {
+            let f = from.take(&orders, None)?;
+            film.orders = Some(orders::Orders::read(f, count)?);
+        }
         let splats = format!("{prefix}splats");
         if from.has(&splats) {
             let mut f = from.take(&splats, Some(count * SPLATS))?;
@@ -164,7 +174,7 @@ impl Film {
             for r in t.coverage().ranges() {
                 let ends = [r.start, r.end - 1].map(nets::around);
                 for net in ends {
-                    if t.coverage().missing(net.clone()) != [] {
+                    if !t.coverage().missing(net.clone()).is_empty() {
                         wanted.insert((i, net.start));
                     }
                 }

@@ -76,7 +76,7 @@ fn variance_is_that_of_nets() {
     assert!((e.mean[0] - mean).abs() < 1e-12);
     assert!((e.variance.unwrap()[0] / variance - 1.0).abs() < 1e-9);
     assert!((e.variance.unwrap()[1] / (4.0 * variance) - 1.0).abs() < 1e-9);
-    assert_eq!((e.samples, e.degrees, e.alpha), (64, 3, 1.0));
+    assert_eq!((e.samples, e.degrees, e.alpha), (64, [3.0; 3], 1.0));
 }
 
 /// Parts in any order, cut anywhere, join to the same bits, variances included.

@@ -23,7 +23,7 @@ impl Rect {
     }
 
     /// Where its pixels are in the rows of a window, in rows from its top.
-    pub fn indices(&self, window: [u32; 4]) -> impl Iterator<Item = usize> + use<> {
+    pub fn indices(&self, window: [u32; 4]) -> impl Iterator<Item = usize> + Clone + use<> {
         let width = (window[2] - window[0]) as usize;
         let columns = self.min[0] - window[0]..self.max[0] - window[0];
         (self.min[1] - window[1]..self.max[1] - window[1]).flat_map(move |y| {

@@ -14,6 +14,11 @@ pub struct TriangleMesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, one a vertex; empty if the mesh has none.
     pub uvs: Vec<Vec2>,
+    /// Linear colours and opacities, one a vertex; empty if the mesh has none.
+    pub colors: Vec<[f32; 4]>,
+    /// Directions of growing u, one a vertex, of any length, whose fourth number is negative where v grows on the other side than
+    /// usual; empty if they are to be taken from the texture coordinates.
+    pub tangents: Vec<[f32; 4]>,
     /// Triangles. The front (towards which the geometric normal points) is where their vertices run counter-clockwise.
     pub indices: Vec<[u32; 3]>,
 }
@@ -341,7 +346,12 @@ fn check_mesh(shape: usize, m: &TriangleMesh) -> Result<(), GeometryError> {
             value: m.positions[vertex],
         });
     }
-    for (attribute, found) in [("normals", m.normals.len()), ("uvs", m.uvs.len())] {
+    for (attribute, found) in [
+        ("normals", m.normals.len()),
+        ("uvs", m.uvs.len()),
+        ("colors", m.colors.len()),
+        ("tangents", m.tangents.len()),
+    ] {
         if found != 0 && found != vertices {
             return Err(GeometryError::AttributeCount {
                 shape,
@@ -357,6 +367,16 @@ fn check_mesh(shape: usize, m: &TriangleMesh) -> Result<(), GeometryError> {
             attribute: "normals",
             vertex,
         });
+    }
+    for (attribute, values) in [("colors", &m.colors), ("tangents", &m.tangents)] {
+        let finite = |v: &[f32; 4]| v.iter().all(|x| x.is_finite());
+        if let Some(vertex) = values.iter().position(|v| !finite(v)) {
+            return Err(GeometryError::Attribute {
+                shape,
+                attribute,
+                vertex,
+            });
+        }
     }
     if let Some(vertex) = m.uvs.iter().position(|n| !n.is_finite()) {
         return Err(GeometryError::Attribute {

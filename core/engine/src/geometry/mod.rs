@@ -56,4 +56,5 @@ pub use accel::{Accel, AccelStats};
 pub use input::{Cylinder, Disk, Geometry, GeometryError, Quad, Shape, Sphere, TriangleMesh};
 pub use instance::Instance;
 pub use ray::{Hit, MAX_COORDINATE, Ray};
+pub(crate) use surface::mixed;
 pub use surface::{SurfacePoint, offset_origin};

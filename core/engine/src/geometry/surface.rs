@@ -27,6 +27,8 @@ pub struct SurfacePoint {
     pub uv: Vec2,
     /// ∂p/∂u. Where the coordinates do not define it: some vector in the tangent plane of `ng`.
     pub dpdu: Vec3,
+    /// Linear colour and opacity of meshes that have them; else white.
+    pub color: [f32; 4],
     /// Index of the shape.
     pub shape: u32,
     /// Primitive within the shape.
@@ -72,6 +74,9 @@ impl Geometry {
     /// True where texture coordinates run clockwise seen from outside: ∂p/∂v is on the other side of ∂p/∂u than ng × ∂p/∂u.
     pub fn uv_mirrored(&self, shape: u32, prim: u32) -> bool {
         match &self.shapes[shape as usize] {
+            Shape::Mesh(m) if !m.tangents.is_empty() => {
+                m.tangents[m.indices[prim as usize][0] as usize][3] < 0.0
+            }
             Shape::Mesh(m) if !m.uvs.is_empty() => {
                 let [a, b, c] = m.indices[prim as usize].map(|i| m.uvs[i as usize].as_dvec2());
                 (b - a).perp_dot(c - a) < 0.0
@@ -206,7 +211,7 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         let n = (n0 * (1.0 - u - v) + n1 * u + n2 * v).normalize_or(ng);
         if n.dot(ng) < 0.0 { -n } else { n }
     };
-    let (uv, dpdu) = if m.uvs.is_empty() {
+    let (uv, mut dpdu) = if m.uvs.is_empty() {
         (Vec2::new(u, v), e1.as_vec3())
     } else {
         let [t0, t1, t2] = corner.map(|i| m.uvs[i]);
@@ -223,6 +228,19 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
             },
         )
     };
+    if !m.tangents.is_empty() {
+        let along = mixed(corner.map(|i| m.tangents[i]), u, v);
+        let along = Vec3::new(along[0], along[1], along[2]);
+        // Without a part in the tangent plane it says nothing.
+        if along.cross(ns).length_squared() > 1e-12 * along.length_squared() {
+            dpdu = along;
+        }
+    }
+    let color = if m.colors.is_empty() {
+        WHITE
+    } else {
+        mixed(corner.map(|i| m.colors[i]), u, v)
+    };
     SurfacePoint {
         p,
         p_error,
@@ -230,10 +248,19 @@ fn mesh(m: &TriangleMesh, hit: &Hit, ray: &Ray, further: f64) -> SurfacePoint {
         ns,
         uv,
         dpdu,
+        color,
         shape: hit.shape,
         prim: hit.prim,
     }
 }
+
+/// Values at the corners of a triangle, interpolated.
+pub fn mixed([a, b, c]: [[f32; 4]; 3], u: f32, v: f32) -> [f32; 4] {
+    [0, 1, 2, 3].map(|i| a[i] * (1.0 - u - v) + b[i] * u + c[i] * v)
+}
+
+/// What shapes without colours have.
+const WHITE: [f32; 4] = [1.0; 4];
 
 #[inline(always)]
 fn quad(q: &Quad, hit: &Hit, ray: &Ray, facet: &Facet, further: f64) -> SurfacePoint {
@@ -252,6 +279,7 @@ fn quad(q: &Quad, hit: &Hit, ray: &Ray, facet: &Facet, further: f64) -> SurfaceP
         ns: ng,
         uv,
         dpdu: q.edge_u,
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -281,6 +309,7 @@ fn sphere(s: &Sphere, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: ng,
         uv,
         dpdu,
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -306,6 +335,7 @@ fn disk(s: &Disk, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: s.normal,
         uv: (uv * 0.5 + 0.5).clamp(Vec2::ZERO, Vec2::ONE),
         dpdu: x.as_vec3() * (2.0 * s.radius),
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }
@@ -336,6 +366,7 @@ fn cylinder(c: &Cylinder, hit: &Hit, ray: &Ray) -> SurfacePoint {
         ns: ng,
         uv: Vec2::new(phi / TAU, (height / length) as f32),
         dpdu: axis.cross(n).as_vec3() * (TAU * c.radius),
+        color: WHITE,
         shape: hit.shape,
         prim: hit.prim,
     }

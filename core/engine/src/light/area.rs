@@ -1,7 +1,7 @@
 //! Emitting shapes.
 
-use super::{Distribution, per_solid_angle};
-use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh};
+use super::{Distribution, Shaping, per_solid_angle};
+use crate::geometry::{Cylinder, Disk, Quad, Sphere, TriangleMesh, mixed};
 use crate::texture::Binding;
 use resolvent_api::Spectrum;
 use resolvent_api::math::{Frame, Vec3, warp};
@@ -25,6 +25,8 @@ pub struct Area {
     /// What the radiance is multiplied with over the surface, and its mean; for meshes and parallelograms. Points are chosen
     /// without regard to it.
     texture: Option<(Binding, Spectrum)>,
+    /// What the radiance is multiplied with by direction, and its mean.
+    shaping: Option<Box<(Shaping, Spectrum)>>,
 }
 
 /// A point on an emitting shape.
@@ -40,6 +42,8 @@ pub struct AreaPoint {
     pub prim: u32,
     /// Texture coordinates, on meshes and parallelograms; zero elsewhere.
     pub uv: [f32; 2],
+    /// Colour of meshes that have colours; else white.
+    pub color: [f32; 4],
 }
 
 impl AreaPoint {
@@ -80,6 +84,7 @@ impl Area {
             area,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -94,6 +99,7 @@ impl Area {
             area,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -107,6 +113,7 @@ impl Area {
             area: PI * disk.radius * disk.radius,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -122,6 +129,7 @@ impl Area {
             area: (2.0 * std::f64::consts::PI * f64::from(cylinder.radius) * length) as f32,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -145,6 +153,7 @@ impl Area {
             area,
             terms: Vec3::ZERO,
             texture: None,
+            shaping: None,
         }
     }
 
@@ -163,24 +172,75 @@ impl Area {
         self
     }
 
-    /// Emitted radiance at texture coordinates.
+    /// The same with its radiance multiplied by a factor that depends on direction.
+    pub fn shaped(mut self, shaping: Option<Shaping>) -> Self {
+        self.shaping = shaping.map(|s| {
+            let normal = match &self.form {
+                AreaShape::Quad(_, n) => Some(*n),
+                AreaShape::Disk(d, _) => Some(d.normal),
+                _ => None,
+            };
+            let mean = match normal {
+                Some(n) if self.two_sided => (s.mean(Some(n)) + s.mean(Some(-n))) * 0.5,
+                normal => s.mean(normal),
+            };
+            Box::new((s, mean))
+        });
+        self
+    }
+
+    /// Emitted radiance at texture coordinates, where the mesh has the colour `color`, in the unit direction `w`, away from the surface.
     #[inline]
-    pub fn radiance_at(&self, uv: [f32; 2]) -> Spectrum {
+    pub fn radiance_towards(&self, uv: [f32; 2], color: &[f32; 4], w: Vec3) -> Spectrum {
+        match &self.shaping {
+            None => self.radiance_at(uv, color),
+            Some(shaping) => self.radiance_at(uv, color) * shaping.0.factor(w),
+        }
+    }
+
+    /// The colour of the mesh at the point `p` of its triangle `prim`; white for shapes without colours.
+    pub fn color_at(&self, prim: u32, p: Vec3) -> [f32; 4] {
+        let AreaShape::Mesh(mesh, _) = &self.form else {
+            return [1.0; 4];
+        };
+        let Some(corner) = mesh.indices.get(prim as usize) else {
+            return [1.0; 4];
+        };
+        if mesh.colors.is_empty() {
+            return [1.0; 4];
+        }
+        // Barycentric coordinates as quotients of areas.
+        let [a, b, c] = corner.map(|i| mesh.positions[i as usize].as_dvec3());
+        let n = (b - a).cross(c - a);
+        let d = p.as_dvec3() - a;
+        let s = (d.cross(c - a).dot(n) / n.length_squared()).clamp(0.0, 1.0);
+        let t = ((b - a).cross(d).dot(n) / n.length_squared()).clamp(0.0, 1.0 - s);
+        mixed(corner.map(|i| mesh.colors[i as usize]), s as f32, t as f32)
+    }
+
+    /// Emitted radiance at texture coordinates, where no direction is favoured.
+    #[inline]
+    fn radiance_at(&self, uv: [f32; 2], color: &[f32; 4]) -> Spectrum {
         match &self.texture {
             None => self.radiance,
             Some((texture, _)) => {
-                let [r, g, b, _] = texture.at(uv);
+                let [r, g, b, _] = texture.at(uv, color);
                 self.radiance * Spectrum::rgb(r, g, b)
             }
         }
     }
 
-    /// Radiant power, W; of textured ones approximately, by the mean of the whole image.
+    /// Radiant power, W; of textured ones approximately, by the mean of the whole image, and of cylinders and meshes that favour
+    /// directions as if their normals were spread evenly.
     pub fn power(&self, lanes: u32) -> f32 {
         let sides = if self.two_sided { 2.0 } else { 1.0 };
         let radiance = match &self.texture {
             None => self.radiance,
             Some((_, mean)) => self.radiance * *mean,
+        };
+        let radiance = match &self.shaping {
+            None => radiance,
+            Some(shaping) => radiance * shaping.1,
         };
         sides * PI * self.area * radiance.mean(lanes)
     }
@@ -199,7 +259,7 @@ impl Area {
     /// Chooses a point, uniform in area.
     #[inline]
     pub fn point(&self, u: [f32; 2]) -> Option<AreaPoint> {
-        let mut uv = [0.0; 2];
+        let (mut uv, mut color) = ([0.0; 2], [1.0; 4]);
         let (p, size, ng, prim) = match &self.form {
             AreaShape::Quad(q, ng) => {
                 let p = q.corner + q.edge_u * u[0] + q.edge_v * u[1];
@@ -226,6 +286,9 @@ impl Area {
                         (a + (b - a) * s + (c - a) * t).into()
                     }
                 };
+                if !mesh.colors.is_empty() {
+                    color = mixed(mesh.indices[i].map(|i| mesh.colors[i as usize]), s, t);
+                }
                 (p, size, ng, i as u32)
             }
             AreaShape::Sphere(s) => {
@@ -254,6 +317,7 @@ impl Area {
             ng,
             prim,
             uv,
+            color,
         })
     }
 
@@ -266,10 +330,11 @@ impl Area {
         if !(shows && distance > 0.0 && density > 0.0 && density.is_finite()) {
             return None;
         }
+        let wi = d / distance;
         Some(LightSample {
-            wi: (d / distance).into(),
+            wi: wi.into(),
             distance,
-            radiance: self.radiance_at(at.uv),
+            radiance: self.radiance_towards(at.uv, &at.color, -wi),
             density,
             light: NONE,
             flags: 0,
@@ -301,6 +366,7 @@ impl Area {
             ng: n,
             prim: 0,
             uv: [0.0; 2],
+            color: [1.0; 4],
         };
         self.finish(from, &at, 1.0 / (2.0 * PI * one_minus_cos))
     }

@@ -9,6 +9,7 @@ mod distribution;
 mod emission;
 mod image;
 mod select;
+mod shaping;
 mod sky;
 mod spot;
 mod tree;
@@ -19,6 +20,7 @@ pub use distribution::Distribution;
 pub use emission::BoundingSphere;
 pub use image::ImageEnvironment;
 pub use select::{Chooser, Lights, Reference, TREE_FROM};
+pub use shaping::Shaping;
 pub use sky::{EFFICACY, Sky, SunSky};
 pub use spot::Spot;
 pub use tree::Tree;
@@ -237,7 +239,7 @@ fn per_solid_angle(per_area: f32, from: Vec3, at: Vec3, ng: Vec3) -> f32 {
 /// The radiance an area light shows towards `w` from the point with normal `ng`.
 pub fn shows(area: &Area, at: &SurfacePoint, w: Vec3) -> Spectrum {
     if area.two_sided || at.ng.dot(w) > 0.0 {
-        area.radiance_at(at.uv.into())
+        area.radiance_towards(at.uv.into(), &at.color, w)
     } else {
         Spectrum::ZERO
     }

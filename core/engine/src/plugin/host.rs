@@ -2,6 +2,7 @@
 
 use crate::texture::Binding;
 use rayon::prelude::*;
+use resolvent_api::SurfacePoint;
 use resolvent_api::abi::{ABI_MINOR, HostTable, Task, Text};
 use std::cell::RefCell;
 use std::ffi::c_void;
@@ -63,6 +64,7 @@ pub(super) static HOST: HostTable = HostTable {
     fail,
     parallel_for,
     texture,
+    texture_at,
 };
 
 /// No lock and no allocation: what it reads was made before the instance that holds the handle.
@@ -73,7 +75,21 @@ unsafe extern "C" fn texture(
     out: *mut [f32; 4],
 ) {
     // SAFETY: the plugin passes a handle that its instance was made with, which keeps the binding alive, and valid pointers.
-    unsafe { *out = (*texture.cast::<Binding>()).at(*uv) };
+    unsafe { *out = (*texture.cast::<Binding>()).at(*uv, &WHITE) };
+}
+
+/// The colour of meshes that have none.
+const WHITE: [f32; 4] = [1.0; 4];
+
+/// As above.
+unsafe extern "C" fn texture_at(
+    _: *mut c_void,
+    texture: *const c_void,
+    at: *const SurfacePoint,
+    out: *mut [f32; 4],
+) {
+    // SAFETY: the plugin passes a handle that its instance was made with, which keeps the binding alive, and valid pointers.
+    unsafe { *out = (*texture.cast::<Binding>()).at((*at).uv, &(*at).color) };
 }
 
 unsafe extern "C" fn log(_: *mut c_void, level: u32, message: Text) {

@@ -2,7 +2,7 @@
 
 use super::{Goal, Keep, Progress, Settings, piece};
 use crate::checkpoint::State;
-use crate::film::{Film, Rect};
+use crate::film::Rect;
 use crate::plugin::ForeignIntegrator;
 use crate::scene::Scene;
 use resolvent_api::abi::Tile;
@@ -126,7 +126,7 @@ impl<'j> Job<'j> {
             features: u32::from(s.features),
             margin: (self.scene.camera.filter().radius() - 0.5).max(0.0),
         };
-        let done = piece::render(self.scene, self.integrator, &tile)
+        let done = piece::render(self.scene, self.integrator, &tile, s.orders)
             .and_then(|finished| self.add(finished, index, into));
         if let Err(why) = done {
             self.fail(why);
@@ -204,15 +204,5 @@ impl<'j> Job<'j> {
         state.seconds = seconds;
         let error = self.error.into_inner().unwrap_or_else(|e| e.into_inner());
         (state, error)
-    }
-}
-
-impl Film {
-    /// Samples that every pixel has.
-    pub fn least_samples(&self) -> u32 {
-        (0..self.tiles().len())
-            .map(|i| self.halves().map(|h| h.coverage(i).samples()).sum())
-            .min()
-            .unwrap_or(0)
     }
 }

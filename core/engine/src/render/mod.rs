@@ -47,6 +47,9 @@ pub struct Settings {
     pub seed: u64,
     /// Fill depth, albedo and normal.
     pub features: bool,
+    /// Layers of light by scattering order; layer k has the light scattered k times, the last one all that was scattered more
+    /// often. 0: none.
+    pub orders: usize,
 }
 
 /// How far a render has come.
@@ -177,20 +180,25 @@ fn begin(settings: &Settings) -> State {
     match settings.goal {
         Goal::Error(goal) => {
             let film = Film::in_halves(settings.window, settings.features);
+            let film = film.with_orders(settings.orders);
             let adaptive = Adaptive::new(goal, film.tiles().len());
             State {
                 adaptive: Some(adaptive),
                 ..State::new(film)
             }
         }
-        _ => State::new(Film::new(settings.window, settings.features)),
+        _ => {
+            let film = Film::new(settings.window, settings.features);
+            State::new(film.with_orders(settings.orders))
+        }
     }
 }
 
 /// Makes sure that the render that `settings` ask for can go on from a state.
 fn check(state: &State, settings: &Settings) -> std::result::Result<(), String> {
     let film = &state.film;
-    if film.window() != settings.window || film.has_features() != settings.features {
+    let layers = (film.has_features(), film.orders());
+    if film.window() != settings.window || layers != (settings.features, settings.orders) {
         return Err("the checkpoint is of another window or has other layers".into());
     }
     match (&state.adaptive, settings.goal) {

@@ -2,12 +2,11 @@
 
 use super::instances::{Copies, Groups, emits};
 use super::interiors::{Collected, Interior, Interiors};
-use super::lights::{area, distant_light, emission_texture, spectrum, sun_sky};
+use super::lights::{area, distant_light, emission_texture, shaping, spectrum, sun_sky};
 use super::shapes::{Wide, affine};
 use super::{Material, NormalMap, PlacedMedium, Surface};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
-use crate::filter::Filter;
 use crate::geometry::{Accel, Geometry, Shape};
 use crate::light::{Area, Bound, BoundingSphere, Light, Lights};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
@@ -179,7 +178,9 @@ impl Scene {
             if let Some(e) = described.emission.filter(|_| emits(described)) {
                 let (index, sides) = (shapes.len() as u32, described.two_sided);
                 let glow = emission_texture(described, scene, &textures)?;
-                let emitter = area(&shape, index, spectrum(e), sides).textured(glow);
+                let emitter = area(&shape, index, spectrum(e), sides)
+                    .textured(glow)
+                    .shaped(shaping(described));
                 lights.push(Light::Area(emitter));
                 surface.light = Some(lights.len() as u32 - 1);
                 surface.null = false;
@@ -233,15 +234,23 @@ impl Scene {
         let accel = Accel::build_instanced(Geometry { shapes }, prototypes, &placed)
             .map_err(|e| Error::Input(format!("{}: {e}", scene.source.file.display())))?;
         let mut copies = match &accel {
-            Some(accel) if accel.stats().instances > 0 => {
-                groups.surfaces(accel, &placed, &mut behind, |described, shape, at, size| {
+            Some(accel) if accel.stats().instances > 0 => groups.surfaces(
+                accel,
+                &placed,
+                &mut behind,
+                |described, shape, at, size, to_world| {
                     let radiance = spectrum(described.emission.unwrap_or_default());
                     let emitter = area(shape, at, radiance, described.two_sided);
                     let glow = emission_texture(described, scene, &textures)?;
-                    lights.push(Light::Area(emitter.made_of(size).textured(glow)));
+                    let turned = shaping(described).map(|s| {
+                        let axis = to_world.vector(s.axis().as_dvec3());
+                        s.about(axis.try_normalize().map_or(s.axis(), |a| a.as_vec3()))
+                    });
+                    let emitter = emitter.made_of(size).textured(glow).shaped(turned);
+                    lights.push(Light::Area(emitter));
                     Ok(lights.len() as u32 - 1)
-                })?
-            }
+                },
+            )?,
             _ => Copies::default(),
         };
         let interiors = collected
@@ -277,15 +286,7 @@ impl Scene {
         let lights = Lights::new(lights, BoundingSphere { center, radius }, lanes);
 
         let camera_pose = to_local.after(&camera_to_world);
-        let c = &scene.camera;
-        let camera = Camera::new(
-            &camera_pose,
-            c.fov_x_deg,
-            scene.film.resolution,
-            c.lens_radius,
-            c.focus_distance,
-            Filter::new(scene.film.filter),
-        );
+        let camera = Camera::new(&camera_pose, &scene.camera, &scene.film);
         let has_passable_surfaces = surfaces
             .iter()
             .chain(copies.surfaces())

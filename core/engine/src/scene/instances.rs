@@ -7,6 +7,7 @@ use crate::geometry::{Accel, Cylinder, Disk, Geometry, Instance, Quad, Shape, Sp
 use glam::DVec3;
 use resolvent_api::{Affine, Vec3};
 use resolvent_scene as describe;
+use resolvent_scene::table;
 use std::collections::HashMap;
 
 /// What stands behind the shapes of instances. Copies that differ in nothing but their place share it.
@@ -68,7 +69,7 @@ impl<'s> Groups<'s> {
         let mut groups: Vec<Group> = Vec::new();
         let mut index: HashMap<&str, usize> = HashMap::new();
         let mut instances = Vec::with_capacity(scene.instances.len());
-        for instance in &scene.instances {
+        for (number, instance) in scene.instances.iter().enumerate() {
             let name = instance.prototype.as_str();
             let group = match index.get(name) {
                 Some(i) => *i,
@@ -78,7 +79,19 @@ impl<'s> Groups<'s> {
                     groups.len() - 1
                 }
             };
-            instances.push((group, instance, affine(&instance.transform)));
+            let to_world = affine(&instance.transform);
+            let Some(file) = &instance.transforms else {
+                instances.push((group, instance, to_world));
+                continue;
+            };
+            let table = table::read(&scene.resolve(file))
+                .map_err(|e| Error::Input(format!("$.instances[{number}].transforms: {e}")))?;
+            instances.reserve(table.len());
+            instances.extend(
+                table
+                    .iter()
+                    .map(|t| (group, instance, to_world.after(&affine(t)))),
+            );
         }
         Ok(Self { groups, instances })
     }
@@ -134,7 +147,7 @@ impl<'s> Groups<'s> {
         accel: &Accel,
         placed: &[Instance],
         mut surface: impl FnMut(&'s describe::Shape, Option<&'s str>) -> Result<Surface>,
-        mut light: impl FnMut(&'s describe::Shape, &Shape, u32, Vec3) -> Result<u32>,
+        mut light: impl FnMut(&'s describe::Shape, &Shape, u32, Vec3, &Affine) -> Result<u32>,
     ) -> Result<Copies> {
         let mut copies = Copies::default();
         let mut known: HashMap<(usize, Option<&str>), u32> = HashMap::new();
@@ -173,7 +186,7 @@ impl<'s> Groups<'s> {
                     + to_world.columns[1].abs() * reach.y
                     + to_world.columns[2].abs() * reach.z;
                 let at = accel.first_shape(number as u32) + k as u32;
-                surface.light = Some(light(described, &shape, at, size.as_vec3())?);
+                surface.light = Some(light(described, &shape, at, size.as_vec3(), &to_world)?);
                 surface.null = false;
             }
             copies.add(surfaces);

@@ -3,7 +3,7 @@
 use super::shapes::affine;
 use crate::error::{Error, Result};
 use crate::geometry::Shape;
-use crate::light::{Area, ImageEnvironment, Light, Spot, SunSky};
+use crate::light::{Area, ImageEnvironment, Light, Shaping, Spot, SunSky};
 use crate::texture::{Binding, Textures};
 use glam::{DMat3, DVec3};
 use resolvent_api::{Spectrum, Vec3};
@@ -35,6 +35,14 @@ pub(super) fn area(shape: &Shape, index: u32, radiance: Spectrum, two_sided: boo
         Shape::Cylinder(c) => Area::cylinder(index, *c, radiance, two_sided),
         Shape::Mesh(m) => Area::mesh(index, m.clone(), radiance, two_sided),
     }
+}
+
+/// What directions a shape's emission favours.
+pub(super) fn shaping(shape: &describe::Shape) -> Option<Shaping> {
+    shape.shaping.map(|s| {
+        let tint = spectrum(s.focus_tint);
+        Shaping::new(unit(s.axis), s.angle_deg, s.softness, s.focus, tint)
+    })
 }
 
 /// A direction of any length, scaled before it is squared.
@@ -87,11 +95,12 @@ pub(super) fn distant_light(
         }
         describe::Light::Environment(describe::Environment::Image {
             file,
+            mapping,
             scale,
             rotation,
         }) => {
             let path = scene.resolve(file);
-            let (width, height, mut texels) = crate::texture::read_rgb(&path)?;
+            let (width, height, mut texels) = crate::texture::read_environment(&path, *mapping)?;
             for t in &mut texels {
                 for (v, s) in t.iter_mut().zip(scale) {
                     *v *= *s as f32;

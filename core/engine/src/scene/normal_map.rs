@@ -29,7 +29,7 @@ impl NormalMap {
     /// The frame that the BSDF is given instead of `frame`. A normal that would point below the surface with geometric normal
     /// `ng` is lifted until it points just above it.
     pub fn turn(&self, frame: &Frame, ng: Vec3, uv: [f32; 2], mirrored: bool) -> Frame {
-        let [r, g, b, _] = self.texture.at(uv);
+        let [r, g, b, _] = self.texture.at(uv, &[1.0; 4]);
         let mut local = Vec3::new(
             (2.0 * r - 1.0) * self.scale,
             (2.0 * g - 1.0) * self.scale,
@@ -81,7 +81,10 @@ mod tests {
             data: TexelData::F32(rgb.to_vec()),
         };
         let described = describe::Texture::new(ImageSource::File("n.exr".into()));
-        NormalMap::new(Arc::new(Texture::new(Arc::new(texels), &described)), scale)
+        NormalMap::new(
+            Arc::new(Texture::new(Some(Arc::new(texels)), &described)),
+            scale,
+        )
     }
 
     fn close(a: [f32; 3], b: Vec3) -> bool {

@@ -23,10 +23,18 @@ pub(super) enum Wide {
     Cylinder(DVec3, DVec3, f64),
     Mesh {
         positions: Vec<DVec3>,
-        normals: Vec<Vec3>,
-        uvs: Vec<Vec2>,
+        attributes: Attributes,
         indices: Vec<[u32; 3]>,
     },
+}
+
+/// What vertices of a mesh have besides their positions, each one a vertex or empty.
+#[derive(Clone, Default)]
+pub(super) struct Attributes {
+    normals: Vec<Vec3>,
+    uvs: Vec<Vec2>,
+    colors: Vec<[f32; 4]>,
+    tangents: Vec<[f32; 4]>,
 }
 
 impl Wide {
@@ -55,10 +63,16 @@ impl Wide {
                 &affine(&m.transform),
                 m.positions.iter().map(|p| DVec3::from(*p)),
                 m.normals.iter().map(|n| DVec3::from(*n)),
-                m.uvs
-                    .iter()
-                    .map(|uv| Vec2::new(uv[0] as f32, uv[1] as f32))
-                    .collect(),
+                Attributes {
+                    uvs: m
+                        .uvs
+                        .iter()
+                        .map(|uv| Vec2::new(uv[0] as f32, uv[1] as f32))
+                        .collect(),
+                    colors: m.colors.iter().map(|c| c.map(|v| v as f32)).collect(),
+                    tangents: m.tangents.iter().map(|t| t.map(|v| v as f32)).collect(),
+                    ..Attributes::default()
+                },
                 m.indices.clone(),
             ),
             // Building replaces models by their meshes before it comes to shapes.
@@ -73,12 +87,17 @@ impl Wide {
                     &affine(transform),
                     m.positions.iter().map(wide),
                     m.normals.as_deref().unwrap_or_default().iter().map(wide),
-                    m.uvs
-                        .as_deref()
-                        .unwrap_or_default()
-                        .iter()
-                        .map(|uv| Vec2::from(*uv))
-                        .collect(),
+                    Attributes {
+                        uvs: m
+                            .uvs
+                            .as_deref()
+                            .unwrap_or_default()
+                            .iter()
+                            .map(|uv| Vec2::from(*uv))
+                            .collect(),
+                        colors: m.colors.unwrap_or_default(),
+                        ..Attributes::default()
+                    },
                     m.indices,
                 )
             }
@@ -89,7 +108,7 @@ impl Wide {
         to_world: &Affine,
         positions: impl Iterator<Item = DVec3>,
         normals: impl Iterator<Item = DVec3>,
-        uvs: Vec<Vec2>,
+        attributes: Attributes,
         mut indices: Vec<[u32; 3]>,
     ) -> Self {
         // Normals go with the cofactor matrix; a mirroring transform flips the winding, so that the outside stays outside.
@@ -104,6 +123,12 @@ impl Wide {
             .map(|n| flip * (cofactor[0] * n.x + cofactor[1] * n.y + cofactor[2] * n.z))
             .map(|n| n.normalize_or_zero().as_vec3())
             .collect();
+        // Tangents go with the surface, and a mirror changes the side of growing v.
+        let tangents = attributes.tangents.iter().map(|[x, y, z, w]| {
+            let along = a * f64::from(*x) + b * f64::from(*y) + c * f64::from(*z);
+            let [x, y, z] = along.normalize_or_zero().as_vec3().to_array();
+            [x, y, z, flip as f32 * w]
+        });
         if flip < 0.0 {
             for t in &mut indices {
                 t.swap(1, 2);
@@ -111,8 +136,11 @@ impl Wide {
         }
         Self::Mesh {
             positions: positions.map(|p| to_world.point(p)).collect(),
-            normals,
-            uvs,
+            attributes: Attributes {
+                normals,
+                tangents: tangents.collect(),
+                ..attributes
+            },
             indices,
         }
     }
@@ -162,16 +190,17 @@ impl Wide {
             }),
             Self::Mesh {
                 positions,
-                normals,
-                uvs,
+                attributes,
                 indices,
             } => Shape::Mesh(TriangleMesh {
                 positions: positions
                     .into_iter()
                     .map(|p| (p - centre).as_vec3())
                     .collect(),
-                normals,
-                uvs,
+                normals: attributes.normals,
+                uvs: attributes.uvs,
+                colors: attributes.colors,
+                tangents: attributes.tangents,
                 indices,
             }),
         }

@@ -349,6 +349,7 @@ impl View<'_> {
             uv: next.uv,
             lanes: self.scene.lanes,
             outside_ior: self.scene.outside_ior(surface, next.inside),
+            color: at.color,
         };
         material
             .bsdf

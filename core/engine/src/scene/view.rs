@@ -188,6 +188,7 @@ impl<'s> View<'s> {
             sense,
             emit,
             emission_density,
+            radiance,
         }
     }
 }
@@ -411,6 +412,17 @@ unsafe extern "C" fn emission_density(
 ) -> Status {
     // SAFETY: as above.
     unsafe { *out = view(ctx).scene.lights.emission_density(&*light, &*to) };
+    Status::OK
+}
+
+unsafe extern "C" fn radiance(
+    ctx: *const c_void,
+    light: *const Vertex,
+    to: *const Vertex,
+    out: *mut Spectrum,
+) -> Status {
+    // SAFETY: as above.
+    unsafe { *out = view(ctx).scene.lights.radiance(&*light, &*to) };
     Status::OK
 }
 

@@ -16,9 +16,20 @@ enum Curve {
     Formula,
 }
 
-/// An image and how it is read.
+/// What the values of a texture come from.
+enum Pixels {
+    /// No image: white everywhere.
+    White,
+    /// One image.
+    Image(Arc<Texels>),
+    /// Images of unit squares, by column + 10 row.
+    Tiles(Box<[Option<Texture>]>),
+}
+
+/// An image, or several side by side, and how it is read.
 pub struct Texture {
-    texels: Arc<Texels>,
+    pixels: Pixels,
+    vertex_color: bool,
     curve: Curve,
     wrap: [Wrap; 2],
     nearest: bool,
@@ -29,22 +40,30 @@ pub struct Texture {
     uv: [[f32; 3]; 2],
 }
 
+/// Columns of tiles.
+pub(super) const COLUMNS: usize = 10;
+/// The colour of meshes that have none.
+const WHITE: [f32; 4] = [1.0; 4];
+
 impl Texture {
-    /// The image `texels` with the settings of `t`.
-    pub fn new(texels: Arc<Texels>, t: &describe::Texture) -> Self {
-        let srgb = match t.color_space {
-            ColorSpace::Auto => !texels.data.is_float(),
-            ColorSpace::Srgb => true,
-            ColorSpace::Linear => false,
-        };
-        let curve = match (&texels.data, srgb) {
-            (_, false) => Curve::None,
-            (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
-            (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
-            (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
-        };
+    /// The image `texels` (white without one) with the settings of `t`.
+    pub fn new(texels: Option<Arc<Texels>>, t: &describe::Texture) -> Self {
+        let curve = texels.as_ref().map_or(Curve::None, |texels| {
+            let srgb = match t.color_space {
+                ColorSpace::Auto => !texels.data.is_float(),
+                ColorSpace::Srgb => true,
+                ColorSpace::Linear => false,
+            };
+            match (&texels.data, srgb) {
+                (_, false) => Curve::None,
+                (TexelData::U8(_), true) => Curve::Table(srgb::table8()),
+                (TexelData::U16(_), true) => Curve::Table(srgb::table16()),
+                (TexelData::F16(_) | TexelData::F32(_), true) => Curve::Formula,
+            }
+        });
         Self {
-            texels,
+            pixels: texels.map_or(Pixels::White, Pixels::Image),
+            vertex_color: t.vertex_color,
             curve,
             wrap: t.wrap,
             nearest: t.filter == TextureFilter::Nearest,
@@ -60,36 +79,79 @@ impl Texture {
         }
     }
 
-    /// Red, green, blue and alpha at the surface's texture coordinates.
-    #[inline]
-    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        let [x, y] = self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
-        // The image's rows go down, its coordinates up.
-        let (x, y) = (self.along(0, x), self.along(1, 1.0 - y));
-        let v = if self.nearest {
-            self.texel(x.nearest(), y.nearest())
-        } else {
-            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
-            let (a, b) = (self.texel(x0, y0), self.texel(x1, y0));
-            let (c, d) = (self.texel(x0, y1), self.texel(x1, y1));
-            // Equal texels give exactly their value.
-            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
-            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
+    /// Tiles by column + 10 row, with the settings of `t`.
+    pub fn tiled(tiles: Vec<Option<Arc<Texels>>>, t: &describe::Texture) -> Self {
+        // What is done to values is done once, to those of the whole.
+        let settings = describe::Texture {
+            uv: describe::UvTransform::default(),
+            wrap: [Wrap::Clamp; 2],
+            channel: None,
+            scale: [1.0; 3],
+            bias: [0.0; 3],
+            vertex_color: false,
+            ..t.clone()
         };
+        let tile = |texels: Option<Arc<Texels>>| texels.map(|x| Self::new(Some(x), &settings));
+        Self {
+            pixels: Pixels::Tiles(tiles.into_iter().map(tile).collect()),
+            ..Self::new(None, t)
+        }
+    }
+
+    /// Red, green, blue and alpha at the surface's texture coordinates, where the mesh has the colour `color`.
+    #[inline]
+    pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
+        let place = || self.uv.map(|r| r[0] * uv[0] + r[1] * uv[1] + r[2]);
+        let mut v = match &self.pixels {
+            Pixels::White => WHITE,
+            Pixels::Image(texels) => self.image(texels, place()),
+            Pixels::Tiles(tiles) => tile(tiles, place()),
+        };
+        if self.vertex_color {
+            v.iter_mut().zip(color).for_each(|(v, c)| *v *= c);
+        }
         self.finish(v)
     }
 
-    /// Mean over the texels of red, green, blue and alpha after `bound`.
-    pub fn mean(&self, bound: impl Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
+    #[inline(always)]
+    fn image(&self, texels: &Texels, [x, y]: [f32; 2]) -> [f32; 4] {
+        // The image's rows go down, its coordinates up.
+        let x = Along::new(x, texels.width, self.wrap[0]);
+        let y = Along::new(1.0 - y, texels.height, self.wrap[1]);
+        if self.nearest {
+            self.texel(texels, x.nearest(), y.nearest())
+        } else {
+            let ((x0, x1, fx), (y0, y1, fy)) = (x.pair(), y.pair());
+            let [a, b, c, d] =
+                [(x0, y0), (x1, y0), (x0, y1), (x1, y1)].map(|(x, y)| self.texel(texels, x, y));
+            // Equal texels give exactly their value.
+            let mix = |a: f32, b: f32, f: f32| a + (b - a) * f;
+            [0, 1, 2, 3].map(|i| mix(mix(a[i], b[i], fx), mix(c[i], d[i], fx), fy))
+        }
+    }
+
+    /// Mean over the texels of red, green, blue and alpha after `bound`, where the mesh is white.
+    pub fn mean(&self, bound: &dyn Fn([f32; 4]) -> [f32; 4]) -> [f32; 4] {
         let mut sum = [0f64; 4];
-        for y in 0..self.texels.height {
-            for x in 0..self.texels.width {
-                let v = bound(self.finish(self.texel(x, y)));
-                (0..4).for_each(|i| sum[i] += f64::from(v[i]));
+        let mut add = |v: [f32; 4], n: usize| {
+            (0..4).for_each(|i| sum[i] += f64::from(v[i]) / n as f64);
+        };
+        let finished = |v| bound(self.finish(v));
+        match &self.pixels {
+            Pixels::White => add(finished(WHITE), 1),
+            Pixels::Image(t) => {
+                for (x, y) in (0..t.height).flat_map(|y| (0..t.width).map(move |x| (x, y))) {
+                    add(finished(self.texel(t, x, y)), t.width * t.height);
+                }
+            }
+            Pixels::Tiles(tiles) => {
+                let n = tiles.iter().flatten().count();
+                for tile in tiles.iter().flatten() {
+                    add(tile.mean(&finished), n);
+                }
             }
         }
-        let n = (self.texels.width * self.texels.height) as f64;
-        sum.map(|s| (s / n) as f32)
+        sum.map(|v| v as f32)
     }
 
     /// Channel, factor and offset.
@@ -102,20 +164,23 @@ impl Texture {
         [r, g, b, v[3]]
     }
 
-    #[inline(always)]
-    fn along(&self, axis: usize, coordinate: f32) -> Along {
-        let size = if axis == 0 {
-            self.texels.width
-        } else {
-            self.texels.height
+    /// All texels of the image, decoded, in rows from its top; none without an image of its own.
+    pub fn decoded(&self) -> impl Iterator<Item = [f32; 4]> {
+        let image = match &self.pixels {
+            Pixels::Image(t) => Some(&**t),
+            _ => None,
         };
-        Along::new(coordinate, size, self.wrap[axis])
+        image.into_iter().flat_map(move |t| {
+            (0..t.height).flat_map(move |y| (0..t.width).map(move |x| self.texel(t, x, y)))
+        })
     }
 
-    /// The texel in column `x` of row `y`, decoded.
+    /// The texel in column `x` of row `y`, decoded; nothing outside of the image.
     #[inline(always)]
-    fn texel(&self, x: usize, y: usize) -> [f32; 4] {
-        let t = &*self.texels;
+    fn texel(&self, t: &Texels, x: usize, y: usize) -> [f32; 4] {
+        if x >= t.width || y >= t.height {
+            return [0.0; 4];
+        }
         let first = (y * t.width + x) * t.channels;
         let range = first..first + t.channels;
         match &t.data {
@@ -148,6 +213,19 @@ impl Texture {
     }
 }
 
+/// The value on the tile that lies under (x, y), nothing where there is none.
+fn tile(tiles: &[Option<Texture>], [x, y]: [f32; 2]) -> [f32; 4] {
+    let (column, row) = (x.floor(), y.floor());
+    let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
+    if !lies {
+        return [0.0; 4];
+    }
+    match tiles.get(row as usize * COLUMNS + column as usize) {
+        Some(Some(tile)) => tile.at([x - column, y - row], &WHITE),
+        _ => [0.0; 4],
+    }
+}
+
 /// One to four channels as four.
 #[inline(always)]
 fn spread<C>(channels: &[C], color: impl Fn(&C) -> f32, alpha: impl Fn(&C) -> f32) -> [f32; 4] {
@@ -165,6 +243,9 @@ fn spread<C>(channels: &[C], color: impl Fn(&C) -> f32, alpha: impl Fn(&C) -> f3
         [] => [0.0; 4],
     }
 }
+
+/// An index beyond every image.
+const OUTSIDE: usize = usize::MAX;
 
 /// A position along one axis of an image, wrapped: in texels from the first one's outer edge.
 #[derive(Clone, Copy)]
@@ -186,6 +267,8 @@ impl Along {
         let unit = match wrap {
             Wrap::Repeat => c - c.floor(),
             Wrap::Clamp => c.clamp(0.0, 1.0),
+            // Further out there is no more than one image away.
+            Wrap::Black => c.clamp(-1.0, 2.0),
             Wrap::Mirror => {
                 let period = c - 2.0 * (0.5 * c).floor();
                 if period > 1.0 { 2.0 - period } else { period }
@@ -201,6 +284,9 @@ impl Along {
     /// The texel whose square it lies in.
     #[inline(always)]
     fn nearest(&self) -> usize {
+        if self.wrap == Wrap::Black && !(0.0..=self.size as f32).contains(&self.position) {
+            return OUTSIDE;
+        }
         // c − ⌊c⌋ rounds to 1 just below an integer: that is the last texel.
         (self.position as usize).min(self.size - 1)
     }
@@ -211,11 +297,15 @@ impl Along {
         let from_middle = self.position - 0.5;
         let low = from_middle.floor();
         let weight = from_middle - low;
+        if self.wrap == Wrap::Black {
+            let place = |i: f32| if i < 0.0 { OUTSIDE } else { i as usize };
+            return (place(low), place(low + 1.0), weight);
+        }
         // At most half a texel beyond either edge.
         let last = self.size - 1;
         let beyond = match self.wrap {
             Wrap::Repeat => (last, 0),
-            Wrap::Clamp | Wrap::Mirror => (0, last),
+            Wrap::Clamp | Wrap::Mirror | Wrap::Black => (0, last),
         };
         let first = if low < 0.0 {
             beyond.0
@@ -250,11 +340,11 @@ mod tests {
         };
         let mut t = described();
         edit(&mut t);
-        Texture::new(Arc::new(texels), &t)
+        Texture::new(Some(Arc::new(texels)), &t)
     }
 
     fn red(t: &Texture, u: f32, v: f32) -> f32 {
-        t.at([u, v])[0]
+        t.at([u, v], &WHITE)[0]
     }
 
     #[test]
@@ -300,6 +390,13 @@ mod tests {
         assert_eq!(at(Wrap::Clamp, 1.0), 8.0);
         assert_eq!(at(Wrap::Mirror, 0.0), 1.0);
         assert_eq!(at(Wrap::Mirror, 1.0), 8.0);
+        // Black: halfway between the last middle and nothing, and nothing beyond.
+        assert_eq!(at(Wrap::Black, 0.0), 0.5);
+        assert_eq!(at(Wrap::Black, 1.0), 4.0);
+        assert_eq!(at(Wrap::Black, 0.375), 2.0);
+        for u in [-1e9, -2.0, -0.13, 1.13, 2.5, 1e9] {
+            assert_eq!(at(Wrap::Black, u), 0.0, "{u}");
+        }
         for i in -3i16..=3 {
             for (x, value) in row.iter().enumerate() {
                 let u = f32::from(i) + (x as f32 + 0.5) / 4.0;
@@ -314,12 +411,53 @@ mod tests {
                 assert_eq!(at(Wrap::Clamp, u), clamped, "{u}");
             }
         }
+        let sharp = grey(4, &row, |t| {
+            t.wrap[0] = Wrap::Black;
+            t.filter = TextureFilter::Nearest;
+        });
+        for (u, expected) in [(-0.01, 0.0), (0.0, 1.0), (0.99, 8.0), (1.01, 0.0)] {
+            assert_eq!(red(&sharp, u, 0.5), expected, "{u}");
+        }
         // Just below an integer, where u − ⌊u⌋ rounds to 1, and numbers that are none.
         let below = grey(4, &row, |t| t.filter = TextureFilter::Nearest);
         assert_eq!(red(&below, -1e-12, 0.5), 8.0);
         for odd in [f32::NAN, f32::INFINITY, f32::MIN, 1e30] {
             assert!(red(&below, odd, odd) >= 1.0);
         }
+    }
+
+    /// Tiles show their own square, upright, and nothing where there is none; factor and offset apply everywhere.
+    #[test]
+    fn tiles() {
+        let tile = |v: [f32; 2]| {
+            Some(Arc::new(Texels {
+                width: 1,
+                height: 2,
+                channels: 1,
+                data: TexelData::F32(v.to_vec()),
+            }))
+        };
+        let mut all = vec![None; 12];
+        (all[0], all[9], all[11]) = (tile([1.0, 2.0]), tile([3.0, 3.0]), tile([4.0, 5.0]));
+        let mut t = described();
+        t.scale = [2.0; 3];
+        t.bias = [0.5; 3];
+        let tiled = Texture::tiled(all, &t);
+        for (u, v, expected) in [
+            (0.5, 0.9, 1.0),
+            (0.5, 0.1, 2.0),
+            (9.5, 0.5, 3.0),
+            (1.2, 1.8, 4.0),
+            (1.2, 1.2, 5.0),
+            (0.5, 1.5, 0.0),
+            (-0.5, 0.5, 0.0),
+            (10.5, 0.5, 0.0),
+            (0.5, 1e20, 0.0),
+            (f32::NAN, 0.5, 0.0),
+        ] {
+            assert_eq!(red(&tiled, u, v), 2.0 * expected + 0.5, "({u}, {v})");
+        }
+        assert_eq!(tiled.mean(&|v| v)[0], 2.0 * 3.0 + 0.5);
     }
 
     #[test]
@@ -342,22 +480,22 @@ mod tests {
             data: TexelData::U8(vec![0, 128, 255, 128, 255, 128, 0, 0]),
         };
         let srgb = describe::Texture::new(ImageSource::File("x.png".into()));
-        let t = Texture::new(Arc::new(rgba.clone()), &srgb);
+        let t = Texture::new(Some(Arc::new(rgba.clone())), &srgb);
         let half = srgb::linear(128.0 / 255.0) as f32;
-        assert_eq!(t.at([0.25, 0.5]), [0.0, half, 1.0, 128.0 / 255.0]);
-        let middle = t.at([0.5, 0.5]);
+        assert_eq!(t.at([0.25, 0.5], &WHITE), [0.0, half, 1.0, 128.0 / 255.0]);
+        let middle = t.at([0.5, 0.5], &WHITE);
         assert_eq!(middle[0], 0.5);
         assert!((middle[3] - 64.0 / 255.0).abs() < 1e-7);
-        let t = Texture::new(Arc::new(rgba), &described());
-        assert_eq!(t.at([0.25, 0.5])[1], 128.0 / 255.0);
+        let t = Texture::new(Some(Arc::new(rgba)), &described());
+        assert_eq!(t.at([0.25, 0.5], &WHITE)[1], 128.0 / 255.0);
         let wide = Texels {
             width: 1,
             height: 1,
             channels: 3,
             data: TexelData::U16(vec![0, 32_896, 65_535]),
         };
-        let t = Texture::new(Arc::new(wide), &srgb);
-        assert_eq!(t.at([0.3, 0.3]), [0.0, half, 1.0, 1.0]);
+        let t = Texture::new(Some(Arc::new(wide)), &srgb);
+        assert_eq!(t.at([0.3, 0.3], &WHITE), [0.0, half, 1.0, 1.0]);
     }
 
     #[test]
@@ -370,14 +508,14 @@ mod tests {
         });
         let auto = describe::Texture::new(ImageSource::File("x.exr".into()));
         assert_eq!(
-            Texture::new(texels.clone(), &auto).at([0.0, 0.0]),
+            Texture::new(Some(texels.clone()), &auto).at([0.0, 0.0], &WHITE),
             [0.5, -0.5, 4.0, 1.0]
         );
         let srgb = describe::Texture {
             color_space: ColorSpace::Srgb,
             ..auto
         };
-        let v = Texture::new(texels, &srgb).at([0.0, 0.0]);
+        let v = Texture::new(Some(texels), &srgb).at([0.0, 0.0], &WHITE);
         assert_eq!([v[0], v[1]], [0.5, -0.5].map(|x| srgb::linear(x) as f32));
     }
 
@@ -392,12 +530,38 @@ mod tests {
         let mut t = described();
         t.scale = [2.0, -1.0, 0.0];
         t.bias = [0.0, 1.0, 0.125];
-        let grey = Texture::new(texels.clone(), &t);
-        assert_eq!(grey.at([0.25, 0.0]), [0.5, 0.75, 0.125, 0.5]);
-        assert_eq!(grey.mean(|v| v), [1.0, 0.5, 0.125, 0.75]);
+        let grey = Texture::new(Some(texels.clone()), &t);
+        assert_eq!(grey.at([0.25, 0.0], &WHITE), [0.5, 0.75, 0.125, 0.5]);
+        assert_eq!(grey.mean(&|v| v), [1.0, 0.5, 0.125, 0.75]);
         t.channel = Some(TextureChannel::Alpha);
-        let alpha = Texture::new(texels, &t);
-        assert_eq!(alpha.at([0.25, 0.0]), [1.0, 0.5, 0.125, 0.5]);
+        let alpha = Texture::new(Some(texels), &t);
+        assert_eq!(alpha.at([0.25, 0.0], &WHITE), [1.0, 0.5, 0.125, 0.5]);
+    }
+
+    /// Vertex colours are factors on texels, alpha included, before a channel is picked; without an image they stand alone.
+    #[test]
+    fn colours_of_vertices() {
+        let texels = Arc::new(Texels {
+            width: 1,
+            height: 1,
+            channels: 2,
+            data: TexelData::F32(vec![0.5, 0.25]),
+        });
+        let color = [0.5, 1.0, 2.0, 0.5];
+        let mut t = described();
+        assert_eq!(
+            Texture::new(Some(texels.clone()), &t).at([0.5; 2], &color),
+            [0.5, 0.5, 0.5, 0.25]
+        );
+        t.vertex_color = true;
+        let product = Texture::new(Some(texels.clone()), &t).at([0.5; 2], &color);
+        assert_eq!(product, [0.25, 0.5, 1.0, 0.125]);
+        assert_eq!(Texture::new(None, &t).at([0.5; 2], &color), color);
+        t.channel = Some(TextureChannel::Alpha);
+        t.scale = [2.0; 3];
+        let alpha = Texture::new(Some(texels), &t).at([0.5; 2], &color);
+        assert_eq!(alpha[..3], [0.25; 3]);
+        assert_eq!(Texture::new(None, &t).mean(&|v| v)[..3], [2.0; 3]);
     }
 
     /// The transform scales, rotates counter-clockwise and moves, in this order.

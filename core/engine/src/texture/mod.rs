@@ -8,6 +8,6 @@ mod lookup;
 mod srgb;
 mod store;
 
-pub use environment::read_rgb;
+pub use environment::read_environment;
 pub use lookup::Texture;
 pub use store::{Binding, ReadImage, Textures};

@@ -6,7 +6,7 @@ use resolvent_image::{Limits, Texels};
 use resolvent_scene::{self as describe, ImageSource};
 use std::collections::HashMap;
 use std::ffi::c_void;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
 /// A texture as one parameter sees it: clamped to the parameter's range. Its address is the handle that plugins hold.
@@ -22,15 +22,15 @@ impl Binding {
         Self { texture, min, max }
     }
 
-    /// Red, green, blue and alpha: finite, and all but alpha within the parameter's range.
+    /// Red, green, blue and alpha where the mesh has the colour `color`: finite, and all but alpha within the parameter's range.
     #[inline]
-    pub fn at(&self, uv: [f32; 2]) -> [f32; 4] {
-        self.bounded(self.texture.at(uv))
+    pub fn at(&self, uv: [f32; 2], color: &[f32; 4]) -> [f32; 4] {
+        self.bounded(self.texture.at(uv, color))
     }
 
     /// Mean over the texels of the image.
     pub fn mean(&self) -> [f32; 4] {
-        self.texture.mean(|v| self.bounded(v))
+        self.texture.mean(&|v| self.bounded(v))
     }
 
     #[inline(always)]
@@ -82,6 +82,81 @@ struct State {
     textures: HashMap<String, Arc<Texture>>,
 }
 
+/// Stands for the number of a tile in the name of a file.
+const UDIM: &str = "<UDIM>";
+
+/// The files of a tiled image with their indices, column + 10 row, in order.
+fn tiles_of(pattern: &Path) -> std::result::Result<Vec<(usize, PathBuf)>, resolvent_image::Error> {
+    let unreadable = |source| resolvent_image::Error::Io {
+        file: pattern.to_owned(),
+        what: "",
+        source,
+    };
+    let name = pattern.file_name().unwrap_or_default().to_string_lossy();
+    let Some((before, after)) = name.split_once(UDIM) else {
+        let what = std::io::Error::other("<UDIM> must stand in the file's name, not in a folder's");
+        return Err(unreadable(what));
+    };
+    let folder = match pattern.parent() {
+        Some(p) if !p.as_os_str().is_empty() => p,
+        _ => Path::new("."),
+    };
+    let folder = folder.canonicalize().map_err(unreadable)?;
+    let mut tiles = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let number = name
+            .strip_prefix(before)
+            .and_then(|n| n.strip_suffix(after));
+        if let Some(number) = number.filter(|n| n.len() == 4)
+            && let Ok(number @ 1001..=9999) = number.parse::<usize>()
+        {
+            tiles.push((number - 1001, path));
+        }
+    }
+    tiles.sort();
+    if tiles.is_empty() {
+        let what = std::io::Error::new(
+            std::io::ErrorKind::NotFound,
+            "no file with a tile's number (1001 to 9999) in place of <UDIM>",
+        );
+        return Err(unreadable(what));
+    }
+    Ok(tiles)
+}
+
+impl State {
+    /// The texels of an image, read at the first time; `None` for no image.
+    fn image(
+        &mut self,
+        source: &ImageSource,
+        scene: &describe::Scene,
+    ) -> std::result::Result<Option<Arc<Texels>>, resolvent_image::Error> {
+        let key = match source {
+            ImageSource::File(file) => {
+                let path = scene.resolve(file);
+                Key::File(path.canonicalize().unwrap_or(path))
+            }
+            ImageSource::Memory(image) => Key::Memory(image.bytes.as_ptr().addr()),
+            ImageSource::White => return Ok(None),
+        };
+        let index = match self.images.get(&key) {
+            Some(index) => *index,
+            None => {
+                let Some(image) = read(source, scene)? else {
+                    return Ok(None);
+                };
+                self.read.push(image);
+                let index = self.read.len() - 1;
+                self.images.insert(key, index);
+                index
+            }
+        };
+        Ok(Some(self.read[index].texels.clone()))
+    }
+}
+
 /// The textures of one scene: an image is read when the first user asks for a texture of it, and once.
 #[derive(Default)]
 pub struct Textures {
@@ -107,27 +182,23 @@ impl Textures {
             .textures
             .get(name)
             .ok_or_else(|| Error::Input(format!("there is no texture '{name}' in the scene")))?;
-        let key = match &described.image {
-            ImageSource::File(file) => {
-                let path = scene.resolve(file);
-                Key::File(path.canonicalize().unwrap_or(path))
-            }
-            ImageSource::Memory(image) => Key::Memory(image.bytes.as_ptr().addr()),
+        let problem = |e: resolvent_image::Error| {
+            let what = format!("texture '{name}': {e}");
+            describe::Problem::new(&scene.source.file, described.place.clone(), what)
         };
-        let index = match state.images.get(&key) {
-            Some(index) => *index,
-            None => {
-                let image = read(&described.image, scene).map_err(|e| {
-                    let what = format!("texture '{name}': {e}");
-                    describe::Problem::new(&scene.source.file, described.place.clone(), what)
-                })?;
-                state.read.push(image);
-                let index = state.read.len() - 1;
-                state.images.insert(key, index);
-                index
+        let texture = match &described.image {
+            ImageSource::File(file) if file.contains(UDIM) => {
+                let mut tiles = Vec::new();
+                for (number, path) in tiles_of(&scene.resolve(file)).map_err(problem)? {
+                    tiles.resize(tiles.len().max(number + 1), None);
+                    let file = ImageSource::File(path.to_string_lossy().into_owned());
+                    tiles[number] = state.image(&file, scene).map_err(problem)?;
+                }
+                Texture::tiled(tiles, described)
             }
+            image => Texture::new(state.image(image, scene).map_err(problem)?, described),
         };
-        let texture = Arc::new(Texture::new(state.read[index].texels.clone(), described));
+        let texture = Arc::new(texture);
         state.textures.insert(name.to_owned(), texture.clone());
         Ok(texture)
     }
@@ -142,8 +213,8 @@ impl Textures {
 fn read(
     source: &ImageSource,
     scene: &describe::Scene,
-) -> std::result::Result<ReadImage, resolvent_image::Error> {
-    Ok(match source {
+) -> std::result::Result<Option<ReadImage>, resolvent_image::Error> {
+    Ok(Some(match source {
         ImageSource::File(file) => {
             let path = scene.resolve(file);
             let (texels, file_bytes) = Texels::read(&path)?;
@@ -160,5 +231,6 @@ fn read(
             texels: Arc::new(Texels::parse(&image.bytes, &image.name, Limits::default())?),
             _bytes: Some(image.bytes.clone()),
         },
-    })
+        ImageSource::White => return Ok(None),
+    }))
 }

@@ -1,8 +1,11 @@
 //! Connections: the strategies of a path, their contribution and their weight.
 
+use super::depth;
 use super::draws::{Draws, End};
-use super::subpath::{Subpath, towards};
-use crate::mis::{self, Heuristic, Strategies};
+use super::path::Joint;
+use super::subpath::{Subpath, sensor_vertex, towards};
+use super::verify::Verified;
+use crate::mis::{self, Heuristic, MediaDensities, Strategies};
 use crate::sampler::Purpose;
 use crate::{features, measure, roulette, scatter};
 use measure::conversion;
@@ -31,8 +34,20 @@ pub struct Bidirectional {
     pub strategies: Strategies,
     /// How weights are made.
     pub heuristic: Heuristic,
-    /// The edge of the last connection.
-    pub edge: Edge,
+    /// What they take for media.
+    pub media: MediaDensities,
+    /// What was recomputed, if that is wanted.
+    pub verified: Option<Verified>,
+}
+
+/// What connects two walks.
+#[derive(Clone, Copy)]
+struct Link {
+    edge: Edge,
+    /// ratio/track, as weights have it.
+    rho: Spectrum,
+    /// Transmittance of the approximate depth; all ones if weights do without.
+    smooth: Spectrum,
 }
 
 /// The densities that a connection changes: of the two vertices it joins and of their neighbours, seen across it.
@@ -46,16 +61,17 @@ struct Across {
 
 impl Bidirectional {
     /// Two walks not begun; `light_walks` walks from lights go with each from a pixel.
-    pub fn new(light_walks: f64, heuristic: Heuristic) -> Self {
+    pub fn new(light_walks: f64, heuristic: Heuristic, media: MediaDensities) -> Self {
         Self {
-            sensor: Subpath::default(),
-            light: Subpath::default(),
+            sensor: Subpath::new(media),
+            light: Subpath::new(media),
             strategies: Strategies {
                 light_walks,
                 ..Strategies::default()
             },
             heuristic,
-            edge: mis::clear(0.0),
+            media,
+            verified: None,
         }
     }
 
@@ -106,7 +122,16 @@ impl Bidirectional {
         };
         let p = node.beta.p;
         self.assemble(0, t, &across, chosen, None);
-        Ok(self.weigh(0, f, p, scene.lanes()))
+        let value = self.weigh([0, t], f, p, None, scene.lanes());
+        if self.verified.is_some() && !value.is_zero() {
+            let joint = Joint {
+                vertex: None,
+                importance: 0.0,
+                edge: None,
+            };
+            self.check(scene, [0, t], joint, value, 1.0)?;
+        }
+        Ok(value)
     }
 
     /// Strategy s = 1: vertex `t − 1` of the walk from the sensor connects to a light chosen as seen from there.
@@ -132,6 +157,7 @@ impl Bidirectional {
             return Ok(Spectrum::ZERO);
         }
         let mut f = node.beta.f * e.f * light.radiance * (1.0 / light.density);
+        let mut survival = 1.0;
         if z.is(VertexKind::Medium) {
             // As in path tracing: a peaked phase function rarely faces the light.
             let q = roulette::connection(e.f.max_lane());
@@ -140,11 +166,13 @@ impl Bidirectional {
                     return Ok(Spectrum::ZERO);
                 }
                 f *= 1.0 / q;
+                survival /= f64::from(q);
             }
         }
         let Some(edge) = scene.connect(z, &light, &draws.connection(1, t as u32))? else {
             return Ok(Spectrum::ZERO);
         };
+        let link = self.link(scene, z, &light, edge)?;
         let x = emitter(&light);
         let [position, direction] = scene.emission_density(&x, z)?;
         let to_light = conversion(z, &x, wi);
@@ -160,9 +188,23 @@ impl Bidirectional {
         };
         let chosen = f64::from(light.density) * to_light;
         let p = node.beta.p * mis::track(&edge);
-        self.assemble(1, t, &across, chosen, Some(&edge));
+        self.assemble(1, t, &across, chosen, Some(&link));
         self.strategies.from_light[0] = f64::from(position);
-        Ok(self.weigh(1, f * edge.value, p, scene.lanes()))
+        let value = self.weigh([1, t], f * edge.value, p, Some(&link), scene.lanes());
+        if self.verified.is_some() && !value.is_zero() {
+            let mut x = x;
+            if delta && !x.is_infinite() {
+                // A point's radiance stands for its intensity as seen from here.
+                x.emitted *= light.distance * light.distance;
+            }
+            let joint = Joint {
+                vertex: Some(x),
+                importance: 0.0,
+                edge: Some(edge),
+            };
+            self.check(scene, [1, t], joint, value, survival)?;
+        }
+        Ok(value)
     }
 
     /// A strategy s ≥ 2, t ≥ 2: vertex `s − 1` of the walk from the light connects to vertex `t − 1` of the other.
@@ -210,9 +252,19 @@ impl Bidirectional {
         };
         let f = ny.beta.f * nz.beta.f * ey.f * ez.f * edge.value * (1.0 / d2) as f32;
         let p = ny.beta.p * nz.beta.p * mis::track(&edge);
-        self.assemble(s, t, &across, 0.0, Some(&edge));
+        let link = self.link(scene, z, &target, edge)?;
+        self.assemble(s, t, &across, 0.0, Some(&link));
         self.start_from_light(scene);
-        Ok(self.weigh(s, f, p, scene.lanes()))
+        let value = self.weigh([s, t], f, p, Some(&link), scene.lanes());
+        if self.verified.is_some() && !value.is_zero() {
+            let joint = Joint {
+                vertex: None,
+                importance: 0.0,
+                edge: Some(edge),
+            };
+            self.check(scene, [s, t], joint, value, 1.0)?;
+        }
+        Ok(value)
     }
 
     /// Strategy t = 1: vertex `s − 1` of the walk from the light connects to the lens. For s = 1 the light itself is seen.
@@ -233,15 +285,11 @@ impl Bidirectional {
             return Ok(None);
         };
         let wi = Vec3::from(sensor.target.wi);
-        let z = Vertex {
-            kind: VertexKind::Sensor as u32,
-            p: sensor.target.p,
-            ..Vertex::empty()
-        };
+        let z = sensor_vertex(sensor.target.p, wi, sensor.target.flags);
         let (start, e) = if s == 1 {
             (
                 Spectrum::splat((1.0 / ny.forward) as f32),
-                shown(scene, y, &z)?,
+                shown(scene, y, &sensor_vertex(sensor.target.p, wi, 0))?,
             )
         } else {
             (ny.beta.f, scatter::eval(scene, y, wi, Mode::Importance)?)
@@ -253,7 +301,11 @@ impl Bidirectional {
         let Some(edge) = scene.connect(y, &sensor.target, &u)? else {
             return Ok(None);
         };
-        let d2 = f64::from(sensor.target.distance).powi(2);
+        let d2 = if z.is_infinite() {
+            1.0
+        } else {
+            f64::from(sensor.target.distance).powi(2)
+        };
         let importance = f64::from(sensor.target.density);
         let f = start * e.f * edge.value * (importance / d2) as f32;
         let p = ny.beta.p * mis::track(&edge);
@@ -271,14 +323,42 @@ impl Bidirectional {
                     },
                 ],
             };
-            self.assemble(s, 1, &across, 0.0, Some(&edge));
+            let link = self.link(scene, y, &sensor.target, edge)?;
+            self.assemble(s, 1, &across, 0.0, Some(&link));
             self.start_from_light(scene);
-            self.weigh(s, f, p, scene.lanes())
+            let value = self.weigh([s, 1], f, p, Some(&link), scene.lanes());
+            if self.verified.is_some() && !value.is_zero() {
+                let joint = Joint {
+                    vertex: Some(z),
+                    importance,
+                    edge: Some(edge),
+                };
+                self.check(scene, [s, 1], joint, value, 1.0)?;
+            }
+            value
         };
         Ok(Some(Splat {
             film: sensor.film,
             radiance,
         }))
+    }
+
+    /// What weights need of the connection `edge` from `from` to `to`.
+    fn link(
+        &self,
+        scene: &SceneView<'_>,
+        from: &Vertex,
+        to: &LightSample,
+        edge: Edge,
+    ) -> Outcome<Link> {
+        let (rho, smooth) = match self.media {
+            MediaDensities::Exact => (mis::rho(&edge), Spectrum::ONE),
+            MediaDensities::Depth => {
+                let t = depth::kept(scene.approximate(from, to)?);
+                (t.map(|t| 1.0 / t), t)
+            }
+        };
+        Ok(Link { edge, rho, smooth })
     }
 
     /// What strategies s ≥ 2 know of the light's vertex beyond the walk.
@@ -296,7 +376,7 @@ impl Bidirectional {
         t: usize,
         across: &Across,
         chosen: f64,
-        connection: Option<&Edge>,
+        connection: Option<&Link>,
     ) {
         let (ys, zs) = (self.light.nodes(), self.sensor.nodes());
         let n = s + t - 1;
@@ -310,7 +390,7 @@ impl Bidirectional {
             out.from_sensor[i] = y.reverse;
             out.delta[i] = y.delta && i + 1 < s;
             if i > 0 {
-                out.rho[i - 1] = mis::rho(&y.edge);
+                out.rho[i - 1] = y.rho;
             }
         }
         let seen = if t > 1 { t } else { 0 };
@@ -320,7 +400,7 @@ impl Bidirectional {
             out.from_light[i] = z.reverse;
             out.delta[i] = z.delta && j + 1 < t;
             if j > 0 {
-                out.rho[i] = mis::rho(&z.edge);
+                out.rho[i] = z.rho;
             }
         }
         for (k, l) in across.light.into_iter().enumerate() {
@@ -334,15 +414,35 @@ impl Bidirectional {
                 out.from_sensor[s - 1 - k] = p;
             }
         }
-        if let (Some(edge), true) = (connection, s > 0) {
-            out.rho[s - 1] = mis::rho(edge);
-            self.edge = *edge;
+        if let (Some(link), true) = (connection, s > 0) {
+            out.rho[s - 1] = link.rho;
         }
     }
 
-    /// The contribution `f` over the densities of all strategies.
-    fn weigh(&self, s: usize, f: Spectrum, p: Spectrum, lanes: u32) -> Spectrum {
-        let divisor = self.strategies.divisor(s, p, lanes, self.heuristic);
+    /// The contribution `f` over the densities of all strategies; `p` has the exact lane densities of walks and connection.
+    fn weigh(
+        &self,
+        [s, t]: [usize; 2],
+        f: Spectrum,
+        p: Spectrum,
+        link: Option<&Link>,
+        lanes: u32,
+    ) -> Spectrum {
+        let divisor = match self.media {
+            MediaDensities::Exact => self.strategies.divisor(s, p, lanes, self.heuristic),
+            MediaDensities::Depth => {
+                let rho = link.map_or(Spectrum::ONE, |l| mis::rho(&l.edge));
+                let mut smooth = link.map_or(Spectrum::ONE, |l| l.smooth);
+                if s > 1 {
+                    smooth *= self.light.nodes()[s - 1].smooth;
+                }
+                if t > 1 {
+                    smooth *= self.sensor.nodes()[t - 1].smooth;
+                }
+                f64::from((p * rho).mean(lanes))
+                    / self.strategies.weight(s, smooth, lanes, self.heuristic)
+            }
+        };
         if divisor > 0.0 {
             f * (1.0 / divisor) as f32
         } else {
@@ -357,7 +457,7 @@ fn reverse_at(e: &ScatterEval, v: &Vertex, before: &Vertex) -> f64 {
 }
 
 /// A vertex as the end of a connection that comes along `w`.
-fn target(v: &Vertex, w: Vec3, distance: f32) -> LightSample {
+pub(super) fn target(v: &Vertex, w: Vec3, distance: f32) -> LightSample {
     let surface = v.is(VertexKind::Surface);
     LightSample {
         wi: w.into(),
@@ -400,9 +500,9 @@ fn emitter(light: &LightSample) -> Vertex {
 /// Radiance of the light's vertex `y` towards the sensor `z`, times its cosine, as if it had scattered.
 fn shown(scene: &SceneView<'_>, y: &Vertex, z: &Vertex) -> Outcome<ScatterEval> {
     let mut e = ScatterEval::default();
-    // Lights without extent can't be seen; others show only the sides that they send rays from.
-    if y.is(VertexKind::Surface) && scene.emission_density(y, z)?[1] > 0.0 {
-        e.f = y.emitted * y.cosine(towards(y, z));
+    // Lights without extent can't be seen.
+    if y.is(VertexKind::Surface) {
+        e.f = scene.radiance(y, z)? * y.cosine(towards(y, z));
     }
     Ok(e)
 }

@@ -1,13 +1,14 @@
 //! Subpaths as data: the vertices of a walk from the sensor or from a light, with the densities at which either end finds them.
 
+use super::depth;
 use super::draws::{Draws, End};
 use crate::measure::conversion;
-use crate::mis::{self, Throughput};
+use crate::mis::{self, MediaDensities, Throughput};
 use crate::sampler::Purpose;
 use crate::{roulette, scatter};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::operator::{Mode, ScatterSample};
-use resolvent_api::vertex::{CameraRay, Edge};
+use resolvent_api::vertex::{CameraRay, Edge, vertex_flags};
 use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
 
 /// A vertex of a subpath.
@@ -25,6 +26,12 @@ pub struct Node {
     pub reverse: f64,
     /// What roulette multiplied `beta` by.
     pub survival: f64,
+    /// What scattering here multiplied `beta` by: f̄·D over its density.
+    pub turn: Spectrum,
+    /// ratio/track of the edge from the vertex before, as weights have it.
+    pub rho: Spectrum,
+    /// Lane densities of the walk until here through approximate depths, relative to their mean; all ones if weights do without.
+    pub smooth: Spectrum,
     /// The walk was turned by a delta lobe here: nothing can be connected to.
     pub delta: bool,
 }
@@ -38,28 +45,41 @@ impl Node {
             forward: 0.0,
             reverse: 0.0,
             survival: 1.0,
+            turn: Spectrum::ONE,
+            rho: Spectrum::ONE,
+            smooth: Spectrum::ONE,
             delta: false,
         }
     }
 }
 
 /// A walk; its storage is kept between paths.
-#[derive(Default)]
 pub struct Subpath {
     nodes: Vec<Node>,
     len: usize,
-    /// Radiance that media emit along the walk (walks from the sensor).
-    pub emitted: Spectrum,
-    /// The part of it that the last edge gave, and how many edges there were: one more than vertices to arrive at if the
-    /// light was lost.
-    pub last_emitted: Spectrum,
-    /// Edges walked.
-    pub edges: usize,
+    media: MediaDensities,
+    /// Density per steradian of the first direction (walks from the sensor: the importance).
+    pub start: f64,
+    /// Radiance that media emit along each edge walked (walks from the sensor): one more than vertices to arrive at if the
+    /// light was lost. That of edge k was scattered k times.
+    pub emitted: Vec<Spectrum>,
     /// Density of the start when it is chosen as seen from the vertex after it (walks from a light), once it was asked for.
     chosen: Option<f64>,
 }
 
 impl Subpath {
+    /// A walk not begun, for weights of this kind.
+    pub fn new(media: MediaDensities) -> Self {
+        Self {
+            nodes: Vec::new(),
+            len: 0,
+            media,
+            start: 0.0,
+            emitted: Vec::new(),
+            chosen: None,
+        }
+    }
+
     /// The vertices.
     pub fn nodes(&self) -> &[Node] {
         &self.nodes[..self.len]
@@ -84,9 +104,7 @@ impl Subpath {
     /// Forgets the walk.
     pub fn clear(&mut self) {
         self.len = 0;
-        self.emitted = Spectrum::ZERO;
-        self.last_emitted = Spectrum::ZERO;
-        self.edges = 0;
+        self.emitted.clear();
         self.chosen = None;
     }
 
@@ -118,11 +136,7 @@ impl Subpath {
         self.clear();
         let first = self.push();
         let node = &mut self.nodes[first];
-        node.vertex = Vertex {
-            kind: VertexKind::Sensor as u32,
-            p: ray.o,
-            ..Vertex::empty()
-        };
+        node.vertex = sensor_vertex(ray.o, -Vec3::from(ray.d), ray.flags);
         node.beta = Throughput::ONE;
         node.beta.f *= ray.weight;
         // The place on the lens is chosen alike by all techniques: its density cancels.
@@ -183,6 +197,7 @@ impl Subpath {
             return Ok(());
         }
         let mut beta = self.nodes[0].beta;
+        self.start = f64::from(density);
         let mut density = f64::from(density);
         let mut survival = 1.0;
         let mut direction = Vec3::from(ray.d);
@@ -200,10 +215,8 @@ impl Subpath {
                 let (edge, next) = (&mut node.edge, &mut node.vertex);
                 scene.propagate(&from.vertex, direction, &flight, edge, next)?
             };
-            self.edges += 1;
             if end == End::Sensor {
-                self.last_emitted = beta.f * node.edge.emitted;
-                self.emitted += self.last_emitted;
+                self.emitted.push(beta.f * node.edge.emitted);
             }
             let arrived = alive && (end == End::Sensor || !node.vertex.is(VertexKind::Emitter));
             if !arrived {
@@ -211,6 +224,25 @@ impl Subpath {
                 break;
             }
             beta.travel::<CHROMATIC>(&node.edge);
+            node.rho = match self.media {
+                MediaDensities::Exact => mis::rho(&node.edge),
+                MediaDensities::Depth => {
+                    let t = match end {
+                        End::Sensor => depth::smooth(scene, &from.vertex, &node.vertex)?,
+                        End::Light => depth::smooth(scene, &node.vertex, &from.vertex)?,
+                    };
+                    if CHROMATIC {
+                        let lit = from.smooth * t;
+                        let p = if node.vertex.is(VertexKind::Medium) {
+                            lit * node.vertex.sigma_t
+                        } else {
+                            lit
+                        };
+                        node.smooth = p * (1.0 / p.mean(lanes).max(f32::MIN_POSITIVE));
+                    }
+                    t.map(|t| 1.0 / t)
+                }
+            };
             node.forward = density * conversion(&from.vertex, &node.vertex, direction);
             node.delta = false;
             node.reverse = 0.0;
@@ -232,6 +264,7 @@ impl Subpath {
             node.delta = scatter::is_delta(&s);
             from.reverse =
                 reverse * conversion(&node.vertex, &from.vertex, Vec3::from(node.vertex.wo));
+            node.turn = s.weight;
             beta.f *= s.weight;
             let q = roulette::survival(beta.weight::<CHROMATIC>(lanes).max_lane() / scale);
             if q < 1.0 {
@@ -262,6 +295,18 @@ fn turn(v: &Vertex, s: &ScatterSample) -> (f64, f64) {
     let cosine = |w: [f32; 3]| f64::from(n.dot(Vec3::from(w)).abs()).max(1e-12);
     let eta = f64::from(s.eta);
     (forward / cosine(s.wi), reverse / (cosine(v.wo) * eta * eta))
+}
+
+/// The vertex on the sensor at `p`, which lies in direction `to` of what it sees; `flags` are the camera's. Parallel rays come from
+/// infinity, as far as densities are concerned.
+pub(super) fn sensor_vertex(p: [f32; 3], to: Vec3, flags: u32) -> Vertex {
+    let parallel = flags & vertex_flags::PARALLEL != 0;
+    Vertex {
+        kind: VertexKind::Sensor as u32,
+        flags: if parallel { vertex_flags::INFINITE } else { 0 },
+        p: if parallel { to.into() } else { p },
+        ..Vertex::empty()
+    }
 }
 
 /// Unit direction from one vertex to the next; towards a vertex at infinity, or away from it.

@@ -10,17 +10,17 @@ pub const FULL: &str = r#"{
   "units": {"meters_per_unit": 0.01},
   "camera": {
     "type": "perspective", "origin": [1.5, 2, 10], "target": [0, 1, 0], "up": [0, 1, 0.1],
-    "fov_x_deg": 44, "lens_radius": 0.05, "focus_distance": 9.5
+    "fov_x_deg": 44, "lens_radius": 0.05, "focus_distance": 9.5, "shift": [0.25, -0.1], "exposure": -1.5
   },
   "film": {
     "resolution": [320, 200], "crop": [10, 20, 300, 180],
     "filter": {"type": "gaussian", "radius": 2, "sigma": 0.6},
-    "aovs": ["depth", "albedo", "normal", "variance", "samples"]
+    "aovs": ["depth", "albedo", "normal", "variance", "samples", "orders:4"], "pixel_aspect": 1.5
   },
   "sampling": {"spp": 128, "seed": 18446744073709551615},
   "integrator": {"plugin": "pt", "params": {"max_depth": 12}},
   "lights": [
-    {"type": "environment", "image": "sky.exr", "scale": [1, 0.9, 0.8],
+    {"type": "environment", "image": "sky.exr", "mapping": "angular", "scale": [1, 0.9, 0.8],
      "transform": [{"rotate_deg": {"axis": [0, 1, 0], "angle": 30}}]},
     {"type": "environment", "radiance": 0.1},
     {"type": "distant", "to_light": [0.6, 0.7, 0.4], "irradiance": [3, 3, 2.5], "angle_deg": 0.53},
@@ -50,7 +50,8 @@ pub const FULL: &str = r#"{
      "transform": [{"scale": 2}, {"rotate_deg": {"axis": [1, 1, 0], "angle": 90}}, {"translate": [0, 0, 5]}],
      "material": "with a blank"},
     {"type": "ply", "file": "bunny.ply", "material": "floor", "interior": "fog", "priority": -2},
-    {"type": "disk", "center": [0, 4, 0], "normal": [0, -2, 0], "radius": 0.5, "emission": 3, "two_sided": true},
+    {"type": "disk", "center": [0, 4, 0], "normal": [0, -2, 0], "radius": 0.5, "emission": 3, "two_sided": true,
+     "shaping": {"axis": [0, -1, 0.1], "angle_deg": 70, "softness": 0.2, "focus": 4, "focus_tint": [0.1, 0, 0.2]}},
     {"type": "cylinder", "base": [1, 0, 0], "axis": [0, 2, 0], "radius": 0.25, "material": "floor", "interior": "fog"}
   ],
   "prototypes": {
@@ -61,7 +62,8 @@ pub const FULL: &str = r#"{
   },
   "instances": [
     {"prototype": "stone"},
-    {"prototype": "stone", "transform": [{"scale": [1, -2, 3]}, {"translate": [5, 0, 0]}], "material": "floor"}
+    {"prototype": "stone", "transform": [{"scale": [1, -2, 3]}, {"translate": [5, 0, 0]}], "material": "floor"},
+    {"prototype": "stone", "transforms": "stones.npy", "transform": [{"translate": [0, 1, 0]}]}
   ]
 }
 "#;

@@ -208,6 +208,10 @@ def _guess(ctx: Context) -> None:
     purposes = list(ctx.purposes)
     box = UsdGeom.BBoxCache(ctx.time, purposes, True).ComputeWorldBound(ctx.stage.GetPseudoRoot()).ComputeAlignedRange()
     lo, hi = (np.array(box.GetMin()), np.array(box.GetMax())) if not box.IsEmpty() else (-np.ones(3), np.ones(3))
+    if ctx.corners:
+        known = [np.stack([lo, hi])] if not box.IsEmpty() else []
+        points = np.concatenate([*known, *ctx.corners])
+        lo, hi = points.min(axis=0), points.max(axis=0)
     if not (np.isfinite(lo).all() and np.isfinite(hi).all()):
         lo, hi = -np.ones(3), np.ones(3)
     centre, radius = 0.5 * (lo + hi), max(0.5 * float(np.linalg.norm(hi - lo)), 1e-6)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,6 +39,8 @@ class Claim:
         self.purpose = purpose
         """The prim's purpose, inherited or its own."""
         self.pruned = False
+        self.at_end: Callable[[], None] | None = None
+        """Called when everything has been converted."""
         self._taken: set[str] = set()
         self._schemas: set[str] = set()
         self._released = False
@@ -129,6 +132,8 @@ class Claim:
 
     def finish(self) -> None:
         """Reports what is authored and was not used."""
+        if self.at_end is not None:
+            self.at_end()
         if self._released:
             return
         for schema in self.prim.GetAppliedSchemas():

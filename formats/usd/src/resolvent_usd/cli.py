@@ -112,7 +112,6 @@ def run(arguments: argparse.Namespace) -> int:
             render_settings=arguments.render_settings,
             subdivision=arguments.subdivision,
             keep_going=arguments.keep_going,
-            strict=arguments.strict,
         )
         stage = stage or open_stage(arguments.stage, options, report)
         convert(stage, output, options, report)

@@ -35,7 +35,6 @@ class Options:
     curve_sides: int = 6
     """Sides of the tubes that curves become."""
     keep_going: bool = False
-    strict: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,6 +45,8 @@ class Look:
     """Keys of the scene's shape: material, emission, emission_texture, two_sided, interior, priority."""
     uv: str | None = None
     """The primvar (without "primvars:") with the texture coordinates of the material's textures."""
+    colors: bool = False
+    """True if textures read the corners' colours: displayColor and displayOpacity."""
 
 
 class Context:
@@ -64,6 +65,8 @@ class Context:
         self.up_axis = str(UsdGeom.GetStageUpAxis(stage))
         self.used: set[tuple[str, str]] = set()
         """(prim path, property) used by another prim than its own: inherited primvars, bound materials, fields."""
+        self.corners: list[Matrix] = []
+        """World positions of corners of boxes that usd-core does not know: those of volumes, (8, 3) each."""
         self.claims: list[Claim] = []
         self.cameras: list[tuple[str, Matrix]] = []
         """Prim paths and matrices to the world of the cameras that the walk met."""

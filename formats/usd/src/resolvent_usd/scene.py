@@ -7,9 +7,10 @@ says how long that is).
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
-from collections.abc import Mapping
+import re
 from pathlib import Path
 from typing import Any
 
@@ -137,8 +138,6 @@ class Scene:
 
 def npy(array: Matrix) -> bytes:
     """The bytes of a NumPy file of little-endian f32, C order."""
-    import io
-
     buffer = io.BytesIO()
     np.lib.format.write_array(buffer, np.ascontiguousarray(array, dtype="<f4"), version=(1, 0))
     return buffer.getvalue()
@@ -146,16 +145,9 @@ def npy(array: Matrix) -> bytes:
 
 def _short_lists(text: str) -> str:
     """Lists of plain numbers on one line."""
-    import re
-
     return re.sub(r"\[\s+([-+\d.eE,\s]+?)\s+\]", lambda m: "[" + re.sub(r"\s+", " ", m[1]) + "]", text)
 
 
 def rgb(value: Any) -> list[float]:
     """Three numbers of a colour."""
     return [float(x) for x in value]
-
-
-def merged(*parts: Mapping[str, Any]) -> Json:
-    """One object of several; keys without a value are left out."""
-    return {key: value for part in parts for key, value in part.items() if value is not None}

@@ -101,13 +101,13 @@ class Network:
 
     def __init__(self, ctx: Context) -> None:
         self.ctx = ctx
-        self._claims: dict[str, Claim] = {}
+        self.claims: dict[str, Claim] = {}
 
     def claim_of(self, prim: Usd.Prim) -> Claim:
         path = str(prim.GetPath())
-        if path not in self._claims:
-            self._claims[path] = self.ctx.claim(prim, np.eye(4), self.ctx.world)
-        return self._claims[path]
+        if path not in self.claims:
+            self.claims[path] = self.ctx.claim(prim, np.eye(4), self.ctx.world)
+        return self.claims[path]
 
     def node(self, prim: Usd.Prim) -> Node:
         return Node(self, prim)
@@ -120,6 +120,7 @@ class Network:
             if shader:
                 output = material.GetOutput(f"{context}:{kind}" if context else kind)
                 if output and output.GetAttr().HasAuthoredConnections():
+                    self.ctx.used.add((str(material.GetPath()), "outputs"))
                     return self.node(shader.GetPrim()), context
         return None
 
@@ -139,6 +140,12 @@ def shading_prim(ctx: Context, claim: Claim) -> None:
     claim.take_schema("MaterialXConfigAPI", "CoordSysAPI", "ColorSpaceAPI", "ColorSpaceDefinitionAPI")
     claim.take(*claim.prim.GetAuthoredPropertyNames())
     claim.prune()
+
+    def unused() -> None:
+        if (claim.path, "outputs") not in ctx.used and claim.path not in network(ctx).claims:
+            ctx.report.note(claim.path, "nothing that is drawn has this material")
+
+    claim.at_end = unused
 
 
 def asset_of(node: Node, name: str) -> tuple[Sdf.AssetPath, Usd.Attribute] | None:

@@ -47,7 +47,8 @@ fn samples_follow_their_density() {
     suite.assert();
 }
 
-/// White furnace: what reflects everything loses nothing, at any roughness and angle.
+/// White furnace: what reflects everything loses nothing and makes nothing, at any roughness and angle, to 1 %; strongly
+/// anisotropic ones to 1.4 %.
 #[test]
 fn nothing_is_lost() {
     let mut suite = Suite::new();
@@ -58,17 +59,16 @@ fn nothing_is_lost() {
         ))
     };
     for roughness in [0.0, 0.2, 0.5, 0.8, 1.0] {
-        let k = perfect(roughness, 0.0);
-        for wo in [at(1.0, 0.0), at(0.6, 0.2), at(-0.3, 0.5), at(0.1, 0.9)] {
-            let what = format!("roughness {roughness} at {wo}");
-            suite.close(&what, albedo(&k, wo, 20_000)[0], 1.0, 0.0, 0.006);
-        }
-    }
-    for anisotropy in [0.3, 0.7, 0.9] {
-        let k = perfect(0.8, anisotropy);
-        for wo in [at(1.0, 0.0), at(0.6, 0.1), at(-0.3, 0.25), at(0.3, 0.97)] {
-            let what = format!("anisotropy {anisotropy} at {wo}");
-            suite.close(&what, albedo(&k, wo, 20_000)[0], 1.0, 0.0, 0.025);
+        for anisotropy in [0.0, 0.3, 0.7, 0.9] {
+            let k = perfect(roughness, anisotropy);
+            for z in [1.0, 0.6, -0.3, 0.1, 0.05] {
+                for turn in [0.0, 0.09, 0.17, 0.25] {
+                    let wo = at(z, turn);
+                    let what = format!("roughness {roughness}, anisotropy {anisotropy} at {wo}");
+                    let bound = if anisotropy > 0.8 { 0.014 } else { 0.01 };
+                    suite.close(&what, albedo(&k, wo, 20_000)[0], 1.0, 0.0, bound);
+                }
+            }
         }
     }
     suite.assert();

@@ -19,13 +19,9 @@
 #[cfg(test)]
 mod tests;
 
-use resolvent_api::microfacet::Interface;
-use resolvent_api::operator::lobes;
+use resolvent_api::microfacet::{Boundary, Interface, boundary};
 use resolvent_api::surface::bsdf_traits;
-use resolvent_api::{
-    Bsdf, Decl, Error, Mode, ParamDecl, Params, Plugin, Scatter, ScatterDraws, ScatterEval,
-    ScatterSample, Spectrum, SurfacePoint, Vec3,
-};
+use resolvent_api::{Bsdf, Error, ParamDecl, Params, Plugin, Spectrum, SurfacePoint};
 
 /// The plugin.
 #[derive(Clone, Copy, Debug)]
@@ -35,44 +31,21 @@ pub struct Dielectric {
     tints: [Spectrum; 2],
 }
 
-/// The boundary at a point.
-#[derive(Clone, Copy, Debug)]
-pub struct Boundary {
-    interface: Interface,
-    /// Factors of what is reflected and transmitted.
-    tints: [Spectrum; 2],
-}
-
 impl Plugin for Dielectric {
     const NAME: &'static str = "dielectric";
     const SUMMARY: &'static str = "The smooth boundary of a transparent body, or a thin sheet.";
     const PARAMS: &'static [ParamDecl] = &[
-        Decl::float("ior", "index of refraction inside")
-            .default("1.5")
-            .at_least(0.2)
-            .at_most(5.0)
-            .build(),
-        Decl::bool("thin", "a thin sheet, through which light passes unbent")
-            .default("false")
-            .build(),
-        Decl::spectrum("reflection_tint", "factor of what is reflected")
-            .default("1")
-            .at_least(0.0)
-            .at_most(1.0)
-            .build(),
-        Decl::spectrum("transmission_tint", "factor of what passes")
-            .default("1")
-            .at_least(0.0)
-            .at_most(1.0)
-            .build(),
+        boundary::IOR,
+        boundary::THIN,
+        boundary::REFLECTION_TINT,
+        boundary::TRANSMISSION_TINT,
     ];
 
     fn create(params: &Params<'_>) -> Result<Self, Error> {
-        let tint = |name: &str| params.spectrum(name).unwrap_or(Spectrum::ONE);
         Ok(Self {
             ior: params.float("ior")? as f32,
             thin: params.bool("thin")?,
-            tints: [tint("reflection_tint"), tint("transmission_tint")],
+            tints: Boundary::tints(params),
         })
     }
 }
@@ -93,28 +66,6 @@ impl Bsdf for Dielectric {
             interface: Interface::new([0.0; 2], self.ior / at.outside_ior, self.thin),
             tints: self.tints,
         }
-    }
-}
-
-impl Scatter for Boundary {
-    /// Delta lobes contribute nothing to any given pair of directions.
-    fn eval(&self, _: Vec3, _: Vec3, _: Mode) -> ScatterEval {
-        ScatterEval::default()
-    }
-
-    #[inline]
-    fn sample(&self, wo: Vec3, u: ScatterDraws, _: Mode) -> Option<ScatterSample> {
-        let mut s = self.interface.sample(wo, u)?;
-        s.weight *= self.tints[s.lobe as usize];
-        (!s.weight.is_zero()).then_some(s)
-    }
-
-    fn lobes(&self) -> u32 {
-        lobes::DELTA
-    }
-
-    fn eta(&self) -> f32 {
-        self.interface.eta()
     }
 }
 

@@ -1,7 +1,8 @@
 //! Tests of the plugin.
 
 use super::*;
-use resolvent_api::operator::Measure;
+use resolvent_api::operator::{Measure, lobes};
+use resolvent_api::{Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample, Vec3};
 use resolvent_tests::Suite;
 use resolvent_tests::host::create;
 use resolvent_tests::scatter::directions;

@@ -3,6 +3,7 @@
 //! | name | type | unit | default | range | meaning |
 //! |---|---|---|---|---|---|
 //! | `base_color` | spectrum | | 0.8 | [0, 1] | diffuse reflectance, or a metal's reflectance at normal incidence |
+//! | `diffuse_roughness` | float | | 0 | [0, 1] | of the diffuse base: 0 is Lambert's |
 //! | `metallic` | float | | 0 | [0, 1] | from dielectric to metal |
 //! | `roughness` | float | | 0.5 | [0, 1] | square root of the facets' width α; below 0.01 smooth |
 //! | `anisotropy` | float | | 0 | [0, 1] | stretches highlights across x, at the same mean square slope |
@@ -17,6 +18,8 @@
 //! | `clearcoat` | float | | 0 | [0, 1] | presence of a coat of varnish |
 //! | `clearcoat_roughness` | float | | 0 | [0, 1] | its roughness |
 //! | `clearcoat_ior` | float | | 1.5 | [1, 3] | its index of refraction |
+//! | `clearcoat_color` | spectrum | | 1 | [0, 1] | what white light has become after crossing it twice along the normal |
+//! | `clearcoat_darkening` | float | | 0 | [0, 1] | how much the base darkens and saturates by reflections within the coat |
 //! | `sheen` | float | | 0 | [0, 1] | presence of fuzz on top of everything |
 //! | `sheen_color` | spectrum | | 1 | [0, 1] | its colour |
 //! | `sheen_roughness` | float | | 0.3 | [0, 1] | spread of its fibres |
@@ -28,10 +31,18 @@
 //! index says. Fuzz, after Estevez & Kulla 2017. The dielectric's reflectance follows Fresnel's curve between its colour at normal
 //! incidence and `specular` at grazing; the metal's is Schlick's with OpenPBR's edge tint.
 //!
-//! **Energy.** What facets lose by shadowing each other is returned (Kulla & Conty 2017), and the diffuse base gets exactly what
-//! the boundary above it lets through in both directions, so that a white base, metal or not, loses nothing. Everything is
-//! reciprocal: layers dim what is below by the smaller transmittance of the two directions, which loses a few percent where a
-//! rough metal lies under a coat or fuzz.
+//! **Energy.** What facets lose by shadowing each other is returned (Kulla & Conty 2017); the diffuse base gets exactly what
+//! the boundary above it lets through in both directions, and facets under coat or fuzz what both passages leave over the mean
+//! passage ([`resolvent_api::microfacet::exits`]), for what the layers send back down is reflected again: a white base, metal, glass
+//! or not, loses nothing, to 1 %. Everything is reciprocal. With anisotropic facets under
+//! a layer, or fuzz on a rough coat, it is 2 %.
+//!
+//! **OpenPBR 1.1** is `base_color` = base weight times colour, `diffuse_roughness`, `metallic`, `roughness`, `anisotropy`,
+//! `specular` and `specular_color`, `ior`, `edge_color` = specular colour of metals, `transmission`, `transmission_color` (without
+//! a depth; with one an `interior` medium, as for transmission scatter and subsurface), `clearcoat`, `_roughness`, `_ior`,
+//! `_color`, `_darkening`, `sheen…` for fuzz (another model of it), `thin`; opacity is `mask`. Not there: thin films, dispersion,
+//! normals and anisotropy of the coat, light that diffuses through thin walls, and the coat's influence on the roughness and index below
+//! it (give the `ior` over that of the coat).
 //!
 //! **Sides.** Where light can enter a body, coat and fuzz are on its outside only; elsewhere both sides are alike. The body's index
 //! counts against what surrounds it. Emission belongs to the shape, absorption inside to its `interior` medium.
@@ -47,6 +58,8 @@
 //!   "base_color": [0.6, 0.02, 0.02], "metallic": 0.6, "roughness": 0.4, "clearcoat": 1 } } }
 //! ```
 
+mod diffuse;
+mod layers;
 mod sheen;
 mod surface;
 #[cfg(test)]
@@ -63,6 +76,7 @@ use surface::Surface;
 #[derive(Clone, Copy, Debug)]
 pub struct Parameters {
     base_color: Spectrum,
+    diffuse_roughness: f32,
     metallic: f32,
     roughness: f32,
     anisotropy: f32,
@@ -77,15 +91,27 @@ pub struct Parameters {
     clearcoat: f32,
     clearcoat_roughness: f32,
     clearcoat_ior: f32,
+    clearcoat_color: Spectrum,
+    clearcoat_darkening: f32,
     sheen: f32,
     sheen_color: Spectrum,
     sheen_roughness: f32,
+}
+
+/// A material that is the same everywhere.
+#[derive(Debug)]
+struct Constant {
+    parameters: Parameters,
+    /// Its layers in vacuum, as most vertices need them.
+    surface: Surface,
+    lanes: u32,
 }
 
 /// The plugin.
 #[derive(Debug)]
 pub struct Principled {
     base_color: TexturedSpectrum,
+    diffuse_roughness: TexturedFloat,
     metallic: TexturedFloat,
     roughness: TexturedFloat,
     anisotropy: TexturedFloat,
@@ -100,11 +126,13 @@ pub struct Principled {
     clearcoat: TexturedFloat,
     clearcoat_roughness: TexturedFloat,
     clearcoat_ior: f32,
+    clearcoat_color: TexturedSpectrum,
+    clearcoat_darkening: TexturedFloat,
     sheen: TexturedFloat,
     sheen_color: TexturedSpectrum,
     sheen_roughness: TexturedFloat,
-    /// The parameters, if they are the same everywhere.
-    constant: Option<Parameters>,
+    /// What is the same everywhere, if all parameters are.
+    constant: Option<Constant>,
 }
 
 const fn share(name: &'static str, default: &'static str, help: &'static str) -> ParamDecl {
@@ -134,6 +162,11 @@ impl Plugin for Principled {
             "base_color",
             "0.8",
             "diffuse reflectance, or a metal's at normal incidence",
+        ),
+        share(
+            "diffuse_roughness",
+            "0",
+            "of the diffuse base: 0 is Lambert's",
         ),
         share("metallic", "0", "from dielectric to metal"),
         share(
@@ -188,6 +221,16 @@ impl Plugin for Principled {
             .at_least(1.0)
             .at_most(3.0)
             .build(),
+        colour(
+            "clearcoat_color",
+            "1",
+            "white light that has crossed the coat twice",
+        ),
+        share(
+            "clearcoat_darkening",
+            "0",
+            "how much reflections within the coat darken the base",
+        ),
         share("sheen", "0", "presence of fuzz"),
         colour("sheen_color", "1", "colour of the fuzz"),
         share("sheen_roughness", "0.3", "spread of the fuzz's fibres"),
@@ -202,6 +245,7 @@ impl Plugin for Principled {
         };
         let mut all = Self {
             base_color: colour("base_color")?,
+            diffuse_roughness: number("diffuse_roughness")?,
             metallic: number("metallic")?,
             roughness: number("roughness")?,
             anisotropy: number("anisotropy")?,
@@ -216,13 +260,21 @@ impl Plugin for Principled {
             clearcoat: number("clearcoat")?,
             clearcoat_roughness: number("clearcoat_roughness")?,
             clearcoat_ior: params.float("clearcoat_ior")? as f32,
+            clearcoat_color: colour("clearcoat_color")?,
+            clearcoat_darkening: number("clearcoat_darkening")?,
             sheen: number("sheen")?,
             sheen_color: colour("sheen_color")?,
             sheen_roughness: number("sheen_roughness")?,
             constant: None,
         };
         if all.is_constant() {
-            all.constant = Some(all.resolve(&SurfacePoint::default()));
+            let parameters = all.resolve(&SurfacePoint::default());
+            let lanes = params.lanes();
+            all.constant = Some(Constant {
+                parameters,
+                surface: Surface::new(&parameters, 1.0, lanes),
+                lanes,
+            });
         }
         Ok(all)
     }
@@ -231,6 +283,8 @@ impl Plugin for Principled {
 impl Principled {
     fn is_constant(&self) -> bool {
         let numbers = [
+            self.diffuse_roughness,
+            self.clearcoat_darkening,
             self.metallic,
             self.roughness,
             self.anisotropy,
@@ -248,6 +302,7 @@ impl Principled {
             Some(self.edge_color),
             self.transmission_color,
             Some(self.sheen_color),
+            Some(self.clearcoat_color),
         ];
         numbers.iter().all(Textured::is_constant)
             && colours.iter().flatten().all(Textured::is_constant)
@@ -257,6 +312,7 @@ impl Principled {
     fn resolve(&self, at: &SurfacePoint) -> Parameters {
         Parameters {
             base_color: self.base_color.at(at),
+            diffuse_roughness: self.diffuse_roughness.at(at),
             metallic: self.metallic.at(at),
             roughness: self.roughness.at(at),
             anisotropy: self.anisotropy.at(at),
@@ -271,6 +327,8 @@ impl Principled {
             clearcoat: self.clearcoat.at(at),
             clearcoat_roughness: self.clearcoat_roughness.at(at),
             clearcoat_ior: self.clearcoat_ior,
+            clearcoat_color: self.clearcoat_color.at(at),
+            clearcoat_darkening: self.clearcoat_darkening.at(at),
             sheen: self.sheen.at(at),
             sheen_color: self.sheen_color.at(at),
             sheen_roughness: self.sheen_roughness.at(at),
@@ -298,7 +356,8 @@ impl Bsdf for Principled {
 
     fn closure(&self, at: &SurfacePoint) -> Surface {
         match &self.constant {
-            Some(parameters) => Surface::new(parameters, at.outside_ior, at.lanes),
+            Some(c) if at.outside_ior == 1.0 && at.lanes == c.lanes => c.surface,
+            Some(c) => Surface::new(&c.parameters, at.outside_ior, at.lanes),
             None => Surface::new(&self.resolve(at), at.outside_ior, at.lanes),
         }
     }

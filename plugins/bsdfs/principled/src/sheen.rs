@@ -8,7 +8,7 @@ use resolvent_api::Vec3;
 use std::sync::OnceLock;
 
 /// Nodes of the table of albedos in the root of the cosine and in the roughness, both from 0 to 1.
-const NODES: usize = 32;
+const NODES: usize = 28;
 /// Least width of the distribution of fibres: below it single precision has no power left to raise a sine to.
 const NARROWEST: f32 = 0.005;
 
@@ -55,15 +55,22 @@ fn shadowing(cos: f32, alpha: f32) -> f32 {
     }
 }
 
-/// Share of the light at cosine `mu` that white fibres reflect, at least what [`value`] gives and at most 1.
+/// Share of the light at cosine `mu` that white fibres reflect: of [`value`] itself.
 pub fn albedo(mu: f32, roughness: f32) -> f32 {
-    look_up(mu, roughness).min(1.0)
+    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
+    let table = TABLE.get_or_init(|| tabulate(value));
+    interpolate(table, mu, roughness).min(1.0)
 }
 
 /// Albedo of the model itself.
 #[inline]
 fn look_up(mu: f32, roughness: f32) -> f32 {
-    let table = TABLE.get_or_init(tabulate);
+    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
+    interpolate(TABLE.get_or_init(|| tabulate(microfacets)), mu, roughness)
+}
+
+#[inline]
+fn interpolate(table: &[f32], mu: f32, roughness: f32) -> f32 {
     let node = |x: f32| {
         let x = x.clamp(0.0, 1.0) * (NODES - 1) as f32;
         let k = (x as usize).min(NODES - 2);
@@ -74,19 +81,17 @@ fn look_up(mu: f32, roughness: f32) -> f32 {
     row(r) * (1.0 - fr) + row(r + 1) * fr
 }
 
-static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
-
 /// Albedos at all nodes, when fuzz is first asked for.
-fn tabulate() -> Vec<f32> {
+fn tabulate(f: fn(Vec3, Vec3, f32) -> f32) -> Vec<f32> {
     let at = |k: usize| k as f32 / (NODES - 1) as f32;
     (0..NODES * NODES)
-        .map(|i| integrate(at(i % NODES).powi(2).max(1e-4), at(i / NODES), microfacets) as f32)
+        .map(|i| integrate(at(i % NODES).powi(2).max(1e-4), at(i / NODES), f) as f32)
         .collect()
 }
 
 /// ∫ f cos θ_i dω_i by midpoints, finer towards grazing directions where fibres are bright.
 pub(crate) fn integrate(mu: f32, roughness: f32, f: fn(Vec3, Vec3, f32) -> f32) -> f64 {
-    const N: usize = 48;
+    const N: usize = 40;
     let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
     let mut sum = 0.0;
     for i in 0..N {

@@ -1,5 +1,7 @@
 //! The layers at a point, and how they scatter together.
 
+use crate::diffuse::Diffuse;
+use crate::layers::{Layers, Passed, darkening};
 use crate::{Parameters, sheen};
 use core::f32::consts::{FRAC_1_PI, FRAC_1_SQRT_2};
 use resolvent_api::math::warp;
@@ -14,7 +16,9 @@ const COAT: usize = 1;
 const BOUNDARY: usize = 2;
 const DIFFUSE: usize = 3;
 const BODY: usize = 4;
-const LOBES: usize = 5;
+/// What the layers send back into the body.
+const BACK: usize = 5;
+const LOBES: usize = 6;
 
 /// Index whose Fresnel curve leads from a reflectance that is given itself to that at grazing.
 const CURVE_IOR: f32 = 1.5;
@@ -57,7 +61,8 @@ impl Boundary {
 pub struct Surface {
     boundary: Boundary,
     metal: Tinted,
-    metallic: f32,
+    /// Share of the metal, times what the coat above darkens it by.
+    metallic: Spectrum,
     /// Share of the diffuse base and its boundary: (1 − metallic)(1 − transmission).
     opaque: f32,
     /// Facets of the metal and of the boundary; `None`: smooth.
@@ -66,6 +71,7 @@ pub struct Surface {
     multiple: Spectrum,
     /// Base colour over π and over the mean of what reaches the base.
     diffuse: Spectrum,
+    rough_diffuse: Diffuse,
     /// Mean of the base colour times its share, for choosing.
     diffuse_mean: f32,
     /// Share of the transparent body.
@@ -73,23 +79,17 @@ pub struct Surface {
     body: Interface,
     /// Factors of what the body reflects on its outside, and of what passes.
     body_tints: [Spectrum; 2],
-    /// Coat and fuzz are on both sides.
-    two_sided: bool,
-    coat: f32,
-    coat_eta: f32,
-    coat_rough: Option<Reflector>,
-    fuzz: Spectrum,
-    fuzz_roughness: f32,
+    layers: Layers,
     lanes: u32,
 }
 
-/// What the layers do to light from one direction.
+/// What is known of one direction.
 struct Passage {
-    /// Transmittance of the fuzz, and of fuzz and coat.
-    fuzz: f32,
-    above: f32,
+    layers: Passed,
     /// Share that reaches the diffuse base, relative to what comes through fuzz and coat: 1 − E.
     base: Spectrum,
+    /// Share of light from inside that the layers send back.
+    back: f32,
     /// Probabilities of the lobes.
     choice: [f32; LOBES],
 }
@@ -112,37 +112,39 @@ impl Surface {
         };
         let transparent = (1.0 - p.metallic) * p.transmission;
         let opaque = (1.0 - p.metallic) * (1.0 - p.transmission);
+        let darker = if p.clearcoat * p.clearcoat_darkening > 0.0 {
+            let dark = darkening(p.base_color, (p.clearcoat_ior / outside).max(1.0));
+            dark.map(|d| 1.0 + p.clearcoat * p.clearcoat_darkening * (d - 1.0))
+        } else {
+            Spectrum::ONE
+        };
         let metal = Tinted::new(p.base_color, p.edge_color);
+        let metallic = darker * p.metallic;
         let widths = alpha(p.roughness, p.anisotropy).map(narrowest);
         let rough = |average| Reflector::new(widths, average, lanes);
         let is_rough = p.roughness >= SMOOTH_BELOW;
-        let average = metal.average() * p.metallic + boundary.average() * opaque;
+        let average = metal.average() * metallic + boundary.average() * opaque;
         let tint = p.transmission_color.unwrap_or(p.base_color);
         let outer = p.specular_color.map(|c| c.min(1.0)) * p.specular;
-        let coat_eta = p.clearcoat_ior / outside;
-        let coat_eta = coat_eta.max(1.0 / coat_eta);
-        let coat_average = Spectrum::splat(fresnel::dielectric_average(coat_eta));
-        let coat_rough = (p.clearcoat > 0.0 && p.clearcoat_roughness >= SMOOTH_BELOW)
-            .then(|| Reflector::new(alpha(p.clearcoat_roughness, 0.0), coat_average, lanes));
         let body_widths = if is_rough { widths } else { [0.0; 2] };
+        let body = Interface::new(body_widths, eta, p.thin);
+        let mut layers = Layers::new(p, outside, transparent == 0.0 || p.thin, lanes);
+        let facets = is_rough.then_some(widths);
+        layers.over(facets, (transparent > 0.0).then_some(&body));
         let mut out = Self {
             boundary,
             metal,
-            metallic: p.metallic,
+            metallic,
             opaque,
             rough: is_rough.then(|| rough(average)),
             multiple: Spectrum::ZERO,
             diffuse: Spectrum::ZERO,
+            rough_diffuse: Diffuse::new(p.diffuse_roughness, p.base_color),
             diffuse_mean: p.base_color.mean(lanes) * opaque,
             transparent,
-            body: Interface::new(body_widths, eta, p.thin),
+            body,
             body_tints: [outer, tint],
-            two_sided: transparent == 0.0 || p.thin,
-            coat: p.clearcoat,
-            coat_eta,
-            coat_rough,
-            fuzz: p.sheen_color * p.sheen,
-            fuzz_roughness: p.sheen_roughness,
+            layers,
             lanes,
         };
         if let Some(r) = &out.rough {
@@ -150,7 +152,15 @@ impl Surface {
         }
         if opaque > 0.0 && !p.base_color.is_zero() {
             let reaches = out.mean_to_base().map(|r| r.max(1e-4));
-            out.diffuse = p.base_color.zip(reaches, |c, r| c * opaque * FRAC_1_PI / r);
+            let lanes = out.lanes;
+            out.rough_diffuse = out.rough_diffuse.below(|mu| {
+                let r = ((1.0 - mu * mu).max(0.0) * 0.5).sqrt();
+                let [fuzz, coat] = out.layers.transmittances(mu);
+                let share = out.boundary_share(Vec3::new(r, r, mu));
+                (1.0 - share.mean(lanes)) * fuzz * coat
+            });
+            let seen = p.base_color * darker;
+            out.diffuse = seen.zip(reaches, |c, r| c * opaque * FRAC_1_PI / r);
         }
         out
     }
@@ -158,8 +168,7 @@ impl Surface {
     /// Mean for diffuse light of the share that reaches the base.
     fn mean_to_base(&self) -> Spectrum {
         let reaches = |e: Spectrum| e.map(|e| 1.0 - e);
-        if self.coat == 0.0 && self.fuzz.is_zero() {
-            // Of what is interpolated, exactly.
+        if self.layers.is_bare() {
             return match &self.rough {
                 None => reaches(self.boundary.average()),
                 Some(r) => {
@@ -177,7 +186,7 @@ impl Surface {
             let r = (1.0 - z * z).sqrt();
             // Anisotropic facets are asked in a direction between their axes.
             let w = Vec3::new(r * FRAC_1_SQRT_2, r * FRAC_1_SQRT_2, z);
-            let (fuzz, coat) = self.layers(w);
+            let [fuzz, coat] = self.layers.transmittances(z);
             sum += reaches(self.boundary_share(w)) * (fuzz * coat / N as f32);
         }
         sum
@@ -198,50 +207,15 @@ impl Surface {
         match &self.rough {
             None => self.boundary.at(w.z.abs()),
             Some(r) => {
-                let f = r.width().reflected(w.z.abs(), self.boundary.eta);
+                let f = r.width().reflected(w, self.boundary.eta);
                 self.boundary_albedo(r.width().single(w), f)
             }
         }
     }
 
-    /// Transmittance of fuzz and coat for light from `w`.
-    #[inline(always)]
-    fn layers(&self, w: Vec3) -> (f32, f32) {
-        if !self.two_sided && w.z < 0.0 {
-            return (1.0, 1.0);
-        }
-        let fuzz = if self.fuzz.is_zero() {
-            1.0
-        } else {
-            1.0 - self.fuzz.max_lane() * sheen::albedo(w.z, self.fuzz_roughness)
-        };
-        let coat = if self.coat == 0.0 {
-            1.0
-        } else {
-            1.0 - self.coat * self.coat_share(w)
-        };
-        (fuzz, coat)
-    }
-
-    /// Albedo of a coat that is fully there.
-    #[inline(always)]
-    fn coat_share(&self, w: Vec3) -> f32 {
-        match &self.coat_rough {
-            None => fresnel::dielectric(w.z.abs(), self.coat_eta).0,
-            Some(r) => r.width().reflected(w.z.abs(), self.coat_eta) + r.returned(w)[0],
-        }
-    }
-
-    /// True if coat and fuzz are on the side of `w`.
-    #[inline(always)]
-    fn is_layered(&self, w: Vec3) -> bool {
-        self.two_sided || w.z > 0.0
-    }
-
     #[inline(always)]
     fn passage(&self, w: Vec3) -> Passage {
-        let (fuzz, coat) = self.layers(w);
-        let above = fuzz * coat;
+        let layers = self.layers.passed(w);
         let share = if self.opaque > 0.0 {
             self.boundary_share(w)
         } else {
@@ -249,25 +223,34 @@ impl Surface {
         };
         let base = share.map(|e| 1.0 - e);
         let mean = |s: Spectrum| s.mean(self.lanes);
-        let metal = if self.metallic > 0.0 {
-            self.metallic * mean(self.metal.at(w.z.abs()))
-        } else {
+        let metal = if self.metallic.is_zero() {
             0.0
+        } else {
+            mean(self.metallic * self.metal.at(w.z.abs()))
         };
+        let (fuzz, above) = (layers.fuzz, layers.above);
         let mut choice = [0.0; LOBES];
-        choice[FUZZ] = (1.0 - fuzz) * mean(self.fuzz) / self.fuzz.max_lane().max(1e-6);
-        choice[COAT] = fuzz * (1.0 - coat);
+        choice[FUZZ] =
+            (1.0 - fuzz) * mean(self.layers.fuzz) / self.layers.fuzz.max_lane().max(1e-6);
+        choice[COAT] = fuzz - above;
         choice[BOUNDARY] = above * (self.opaque * mean(share) + metal);
         choice[DIFFUSE] = above * self.diffuse_mean * mean(base);
-        choice[BODY] = above * self.transparent;
+        let mut back = 0.0;
+        if self.transparent > 0.0 {
+            if !self.layers.covers(w) && !self.body.is_smooth() {
+                back = self.layers.sent_back(w, &self.body);
+            }
+            choice[BODY] = above * self.transparent * (1.0 - back);
+            choice[BACK] = self.transparent * back;
+        }
         let sum: f32 = choice.iter().sum();
         if sum > 0.0 {
             choice.iter_mut().for_each(|c| *c /= sum);
         }
         Passage {
-            fuzz,
-            above,
+            layers,
             base,
+            back,
             choice,
         }
     }
@@ -276,7 +259,7 @@ impl Surface {
     #[inline(always)]
     fn reflectance(&self, cos: f32) -> Spectrum {
         let mut f = Spectrum::ZERO;
-        if self.metallic > 0.0 {
+        if !self.metallic.is_zero() {
             f += self.metal.at(cos) * self.metallic;
         }
         if self.opaque > 0.0 {
@@ -287,7 +270,7 @@ impl Surface {
 
     #[inline(always)]
     fn body_tint(&self, wo: Vec3, crosses: bool) -> Spectrum {
-        match (crosses, wo.z > 0.0 || self.two_sided) {
+        match (crosses, self.layers.covers(wo)) {
             (true, _) => self.body_tints[1],
             (false, true) => self.body_tints[0],
             (false, false) => Spectrum::ONE,
@@ -304,43 +287,53 @@ impl Surface {
             out.reverse += pi.choice[lobe] * e.reverse;
         };
         let crosses = wo.z * wi.z < 0.0;
-        let below = po.above.min(pi.above);
+        let (lo, li) = (&po.layers, &pi.layers);
+        let tint = lo.tint * li.tint;
+        let reflects = tint * (lo.reflects * li.reflects);
         if self.transparent > 0.0 && !self.body.is_smooth() {
-            let tint = self.body_tint(wo, crosses);
-            add(
-                BODY,
-                tint * (self.transparent * below),
-                self.body.eval(wo, wi),
-            );
+            // Where only one side is covered, what passes is dimmed once; on both, it is spread like what is reflected.
+            let passes = if crosses && !self.layers.two_sided {
+                tint * (lo.above * li.above)
+            } else {
+                reflects
+            };
+            let factor = self.body_tint(wo, crosses) * passes * self.transparent;
+            add(BODY, factor, self.body.eval(wo, wi));
         }
         if crosses || wo.z == 0.0 || wi.z == 0.0 {
             return out;
         }
-        if self.is_layered(wo) {
-            if !self.fuzz.is_zero() {
-                let f = sheen::value(wo, wi, self.fuzz_roughness);
+        let (i, o) = (wi.z.abs() * FRAC_1_PI, wo.z.abs() * FRAC_1_PI);
+        let layers = &self.layers;
+        if po.back > 0.0 {
+            let f = layers.back(po.back, pi.back);
+            add(BACK, Spectrum::splat(self.transparent), same(f, i, o));
+        }
+        if layers.covers(wo) {
+            if !layers.fuzz.is_zero() {
+                let f = sheen::value(wo, wi, layers.fuzz_roughness);
                 let uniform = 0.5 * FRAC_1_PI;
-                add(FUZZ, self.fuzz, same(f, uniform, uniform));
+                add(FUZZ, layers.fuzz, same(f, uniform, uniform));
             }
-            if self.coat > 0.0
-                && let Some(coat) = &self.coat_rough
+            if layers.coat > 0.0
+                && let Some(coat) = &layers.coat_rough
             {
                 let e = coat.eval(wo, wi, |cos| {
-                    Spectrum::splat(fresnel::dielectric(cos, self.coat_eta).0)
+                    Spectrum::splat(fresnel::dielectric(cos, layers.coat_eta).0)
                 });
-                add(COAT, Spectrum::splat(self.coat * po.fuzz.min(pi.fuzz)), e);
+                add(COAT, Spectrum::splat(layers.coat * lo.fuzz.min(li.fuzz)), e);
             }
         }
         if let Some(rough) = &self.rough
-            && self.metallic + self.opaque > 0.0
+            && (self.opaque > 0.0 || !self.metallic.is_zero())
         {
             let e = rough.eval(wo, wi, |cos| self.reflectance(cos));
-            add(BOUNDARY, Spectrum::splat(below), e);
+            add(BOUNDARY, reflects, e);
         }
         if !self.diffuse.is_zero() {
-            let (i, o) = (wi.z.abs() * FRAC_1_PI, wo.z.abs() * FRAC_1_PI);
-            let reaches = po.base * pi.base * (po.above * pi.above);
-            add(DIFFUSE, self.diffuse * reaches, same(1.0, i, o));
+            let reaches = po.base * pi.base * tint * (lo.above * li.above);
+            let f = self.diffuse * self.rough_diffuse.value(wo, wi);
+            add(DIFFUSE, f * reaches, same(1.0, i, o));
         }
         out
     }
@@ -396,32 +389,28 @@ impl Scatter for Surface {
                 let w = warp::around_z(1.0 - u.dir[0], u.dir[1]);
                 Vec3::new(w.x, w.y, w.z * up)
             }
-            COAT => match &self.coat_rough {
+            COAT => match &self.layers.coat_rough {
                 Some(coat) => coat.sample(wo, u)?,
                 None => {
-                    let f = fresnel::dielectric(wo.z.abs(), self.coat_eta).0;
-                    let weight = Spectrum::splat(self.coat * po.fuzz * f);
+                    let f = fresnel::dielectric(wo.z.abs(), self.layers.coat_eta).0;
+                    let weight = Spectrum::splat(self.layers.coat * po.layers.fuzz * f);
                     return Some(self.mirror(wo, weight, &po, COAT));
                 }
             },
             BOUNDARY => match &self.rough {
                 Some(rough) => rough.sample(wo, u)?,
                 None => {
-                    let weight = self.reflectance(wo.z.abs()) * po.above;
+                    let tint = po.layers.tint * po.layers.tint;
+                    let weight = self.reflectance(wo.z.abs()) * tint * po.layers.above;
                     return Some(self.mirror(wo, weight, &po, BOUNDARY));
                 }
             },
-            DIFFUSE => {
+            DIFFUSE | BACK => {
                 let w = warp::cosine_hemisphere(u.dir);
                 Vec3::new(w.x, w.y, w.z * up)
             }
-            _ => {
-                let s = self.body.sample(wo, u)?;
-                if self.body.is_smooth() {
-                    return self.through(wo, s, &po);
-                }
-                Vec3::from(s.wi)
-            }
+            _ if self.body.is_smooth() => return self.through(wo, u, &po),
+            _ => Vec3::from(self.body.sample(wo, u)?.wi),
         };
         if wi.z == 0.0 {
             return None;
@@ -449,9 +438,15 @@ impl Scatter for Surface {
                 out |= if smooth { lobes::DELTA } else { lobes::SMOOTH };
             }
         };
-        set(!self.diffuse.is_zero() || !self.fuzz.is_zero(), false);
-        set(self.coat > 0.0, self.coat_rough.is_none());
-        set(self.metallic + self.opaque > 0.0, self.rough.is_none());
+        set(
+            !self.diffuse.is_zero() || !self.layers.fuzz.is_zero(),
+            false,
+        );
+        set(self.layers.coat > 0.0, self.layers.coat_rough.is_none());
+        set(
+            self.opaque > 0.0 || !self.metallic.is_zero(),
+            self.rough.is_none(),
+        );
         set(self.transparent > 0.0, self.body.is_smooth());
         out
     }
@@ -462,19 +457,50 @@ impl Scatter for Surface {
 }
 
 impl Surface {
-    /// A sample of the smooth body, as one of all lobes.
-    fn through(&self, wo: Vec3, mut s: ScatterSample, po: &Passage) -> Option<ScatterSample> {
+    /// A sample of the smooth body, as one of all lobes. From inside, the layers send back a part of what passes.
+    fn through(&self, wo: Vec3, mut u: ScatterDraws, po: &Passage) -> Option<ScatterSample> {
+        let out = self.layers.covers(wo) || self.layers.is_bare();
+        let mut kept = 1.0;
+        if !out {
+            let last = 1.0 - f32::EPSILON;
+            let passes = self.body.sample(wo, ScatterDraws { lobe: last, ..u })?;
+            if Vec3::from(passes.wi).z > 0.0 {
+                kept = self.passage(passes.wi.into()).layers.above;
+                let through = passes.forward * kept;
+                if u.lobe < 1.0 - through {
+                    // The body's own reflection and what the layers send back, one as steep as the other.
+                    let weight = Spectrum::splat(self.transparent * (1.0 - through));
+                    let mut s = self.mirror(wo, weight, po, BODY);
+                    s.weight = s.weight / (1.0 - through);
+                    s.forward *= 1.0 - through;
+                    s.reverse = s.forward;
+                    return Some(s);
+                }
+                u.lobe = last;
+            }
+        }
+        let mut s = self.body.sample(wo, u)?;
         let wi = Vec3::from(s.wi);
         let pi = self.passage(wi);
         let crosses = wi.z * wo.z < 0.0;
-        let below = po.above.min(pi.above);
+        let (lo, li) = (&po.layers, &pi.layers);
         let (there, back) = (po.choice[BODY], pi.choice[BODY]);
-        let factor = self.transparent * below / there;
-        s.weight = s.weight * self.body_tint(wo, crosses) * factor;
+        let tint = self.body_tint(wo, crosses) * lo.tint * li.tint;
+        // From outside the layers dim what comes; from inside the choice does.
+        let dims = match (out, crosses && !self.layers.two_sided) {
+            (true, true) => lo.above,
+            (true, false) => lo.reflects * li.reflects,
+            (false, _) => 1.0,
+        };
+        s.weight = s.weight * tint * (self.transparent * dims / there);
+        if crosses && !self.layers.two_sided {
+            s.forward *= kept;
+            s.reverse *= lo.above;
+        }
         s.forward *= there;
         s.reverse *= back;
         s.lobe = BODY as u32;
-        Some(s)
+        (s.forward > 0.0).then_some(s)
     }
 }
 

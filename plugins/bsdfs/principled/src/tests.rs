@@ -89,10 +89,15 @@ fn samples_follow_their_density() {
             r#"{ "transmission": 1, "roughness": 0.6, "thin": true, "transmission_color": [1, 0.5, 0] }"#,
             at(0.5, 0.7),
         ),
+        (
+            r#"{ "base_color": [0.9, 0.6, 0.2], "diffuse_roughness": 0.8, "metallic": 0.5, "clearcoat": 1,
+                 "clearcoat_roughness": 0.3, "clearcoat_color": [0.9, 0.5, 0.3], "clearcoat_darkening": 1 }"#,
+            at(0.7, 0.2),
+        ),
     ] {
         let k = surface(params);
         assert_eq!(k.lobes(), lobes::SMOOTH);
-        check_around(&mut suite, params, &k, Measured::Bsdf, wo, Vec3::Z, 0.01);
+        check_around(&mut suite, params, &k, Measured::Bsdf, wo, Vec3::Z, 0.012);
     }
     suite.assert();
 }
@@ -127,39 +132,118 @@ fn a_white_base_loses_nothing() {
     suite.assert();
 }
 
-/// Layers never make energy; over a white diffuse base they lose hardly any, over a rough metal what the manual says.
+/// White furnace under layers: coat and fuzz over a white base of any kind lose nothing (to 1 %) and make nothing (to
+/// 1.25 %), from either side; narrow fuzz to 1.2 %, a rough coat under fuzz and anisotropic facets to 2 %.
 #[test]
-fn layers_make_no_energy() {
+fn layers_lose_nothing() {
     let mut suite = Suite::new();
-    for (layers, least) in [
+    let layers = [
         (r#""clearcoat": 1"#, 0.99),
-        (r#""clearcoat": 1, "clearcoat_roughness": 0.6"#, 0.98),
-        (r#""sheen": 1"#, 0.98),
+        (r#""clearcoat": 0.6, "clearcoat_ior": 1.8"#, 0.99),
+        (r#""clearcoat": 1, "clearcoat_roughness": 0.6"#, 0.99),
         (
-            r#""sheen": 1, "sheen_roughness": 0.8, "clearcoat": 0.5"#,
+            r#""clearcoat": 1, "clearcoat_roughness": 1, "clearcoat_darkening": 1"#,
+            0.99,
+        ),
+        (r#""sheen": 1"#, 0.988),
+        (r#""sheen": 0.7, "sheen_roughness": 1"#, 0.99),
+        (
+            r#""sheen": 1, "sheen_roughness": 0.8, "clearcoat": 0.5, "clearcoat_roughness": 0.5"#,
             0.98,
         ),
-        (r#""metallic": 1, "clearcoat": 1"#, 0.9),
-        (r#""metallic": 1, "sheen": 1, "sheen_roughness": 1"#, 0.85),
-        (r#""metallic": 1, "roughness": 0, "clearcoat": 1"#, 0.999),
-        (r#""transmission": 1, "clearcoat": 1"#, 0.9),
-        (r#""transmission": 1, "roughness": 0, "clearcoat": 1"#, 0.96),
-    ] {
-        let params = format!(r#"{{ "base_color": 1, {layers} }}"#);
-        let k = surface(&params);
-        for wo in [
-            at(1.0, 0.0),
-            at(0.6, 0.2),
-            at(0.2, 0.5),
-            at(0.03, 0.1),
-            at(-0.7, 0.9),
-        ] {
-            let a = albedo(&k, wo, 40_000)[0];
-            suite.claim((a > least || wo.z.abs() < 0.1) && a < 1.006, || {
-                format!("{params} at {wo}: {a}")
-            });
+    ];
+    let bases = [
+        r#""roughness": 0.5"#,
+        r#""roughness": 1, "diffuse_roughness": 1"#,
+        r#""metallic": 1, "roughness": 0"#,
+        r#""metallic": 1, "roughness": 0.3"#,
+        r#""metallic": 1, "roughness": 0.6, "anisotropy": 0.6"#,
+        r#""metallic": 1, "roughness": 1"#,
+        r#""transmission": 1, "roughness": 0"#,
+        r#""transmission": 1, "roughness": 0.4"#,
+        r#""transmission": 1, "roughness": 1, "ior": 1.3"#,
+        r#""transmission": 1, "roughness": 0.5, "thin": true"#,
+    ];
+    for base in bases {
+        for (layer, least) in layers {
+            let params = format!(r#"{{ "base_color": 1, {base}, {layer} }}"#);
+            let k = surface(&params);
+            for wo in [
+                at(1.0, 0.0),
+                at(0.6, 0.2),
+                at(0.2, 0.5),
+                at(0.05, 0.1),
+                at(-0.9, 0.9),
+                at(-0.5, 0.3),
+                at(-0.15, 0.7),
+            ] {
+                let a = albedo(&k, wo, 20_000)[0];
+                // The exits of anisotropic facets are taken for those of isotropic ones as wide as they look.
+                let slack = if base.contains("anisotropy") {
+                    0.01
+                } else {
+                    0.0
+                };
+                let most = slack + if wo.z.abs() < 0.1 { 1.015 } else { 1.0125 };
+                suite.claim(a > least - slack && a < most, || {
+                    format!("{params} at {wo}: {a}")
+                });
+            }
         }
     }
+    suite.assert();
+}
+
+/// Coloured metal under a coat: darkening makes it darker and more saturated, colour tints it, white stays.
+#[test]
+fn colour_and_darkening_of_the_coat() {
+    let albedo_of = |rest: &str| {
+        let k = surface(&format!(
+            r#"{{ "base_color": [0.9, 0.5, 0.2], "metallic": 1, "roughness": 0.3, "clearcoat": 1{rest} }}"#
+        ));
+        albedo(&k, at(0.8, 0.1), 20_000)
+    };
+    let (plain, dark) = (albedo_of(""), albedo_of(r#", "clearcoat_darkening": 1"#));
+    assert!(dark[0] < plain[0] && dark[2] / dark[0] < plain[2] / plain[0]);
+    // (1 − K)/(1 − 0.5 K) with K the inner reflectance of glass for diffuse light, 0.596; the coat's own share stays.
+    let k = f64::from(fresnel::dielectric_average(1.0 / 1.5));
+    let coat = f64::from(fresnel::dielectric(0.8, 1.5).0);
+    let expected = coat + (plain[1] - coat) * (1.0 - k) / (1.0 - 0.5 * k);
+    assert!((dark[1] - expected).abs() < 2e-3, "{dark:?} {expected}");
+    // At normal incidence, along which a smooth base reflects, two passages.
+    let k = surface(
+        r#"{ "base_color": 1, "metallic": 1, "roughness": 0, "clearcoat": 1, "clearcoat_color": [1, 0.25, 0] }"#,
+    );
+    let a = albedo(&k, Vec3::Z, 20_000);
+    for (a, color) in a.iter().zip([1.0, 0.25, 1e-6]) {
+        assert!((a - (0.04 + 0.96 * color)).abs() < 2e-3, "{a} {color}");
+    }
+}
+
+/// The rough diffuse base alone: no loss where white, the closed albedo and value of the paper's single scattering.
+#[test]
+fn rough_diffuse_base() {
+    let mut suite = Suite::new();
+    let base = |roughness: f32, color: f32| {
+        surface(&format!(
+            r#"{{ "base_color": {color}, "specular": 0, "diffuse_roughness": {roughness} }}"#
+        ))
+    };
+    for roughness in [0.0, 0.3, 1.0] {
+        for z in [1.0, 0.5, 0.1] {
+            let a = albedo(&base(roughness, 1.0), at(z, 0.3), 50_000)[0];
+            suite.close("white", a, 1.0, 0.0, 2e-3);
+        }
+    }
+    // Black in the limit: single scattering by hand at 60° and 45°, azimuths 0 and π/3 apart.
+    let k = base(1.0, 1e-3);
+    let (wo, wi) = (at(0.5, 0.0), at(0.5f32.sqrt(), 1.0 / 6.0));
+    let pi = core::f64::consts::PI;
+    let s = 0.75f64.sqrt() * 0.5f64.sqrt() * (pi / 3.0).cos();
+    let a = 1.0 / (1.0 + 0.5 - 2.0 / (3.0 * pi));
+    let f = 1e-3 / pi * a * (1.0 + s / 0.5f64.sqrt());
+    let found = f64::from(k.eval(wo, wi, Mode::Radiance).f[0]);
+    suite.close("single", found, f, 1e-3, 0.0);
     suite.assert();
 }
 
@@ -260,6 +344,7 @@ fn delta_lobes_backwards() {
     for params in [
         r#"{ "transmission": 0.6, "roughness": 0, "metallic": 0.3, "base_color": [0.9, 0.5, 0.2] }"#,
         r#"{ "transmission": 0.6, "roughness": 0, "clearcoat": 0.7, "sheen": 0.5 }"#,
+        r#"{ "transmission": 1, "roughness": 0, "clearcoat": 1, "clearcoat_color": [1, 0.5, 0.2] }"#,
         r#"{ "transmission": 1, "roughness": 0, "thin": true, "clearcoat": 0.4 }"#,
         r#"{ "roughness": 0.4, "anisotropy": 0.5, "clearcoat": 1 }"#,
     ] {
@@ -353,7 +438,11 @@ fn albedo_of_fuzz() {
             let reflected = sheen::integrate(mu, roughness, sheen::value);
             let what = format!("fuzz of {roughness} at {mu}");
             // Closest to grazing, where values change within a cell, table and sum are coarse.
-            let coarse = if mu < 0.01 { 0.013 } else { 0.004 };
+            let coarse = if mu < 0.01 {
+                0.02
+            } else {
+                0.004 + 0.02 * stated
+            };
             suite.claim(reflected <= stated + coarse && stated <= 1.0, || {
                 format!("{what}: {reflected} of {stated}")
             });
@@ -397,6 +486,8 @@ fn nothing_is_ever_nan() {
         r#"{ "ior": 5, "clearcoat": 1, "clearcoat_ior": 1, "sheen": 1, "sheen_roughness": 0 }"#,
         r#"{ "clearcoat": 1, "clearcoat_roughness": 0.01, "transmission": 1, "thin": true }"#,
         r#"{ "specular_color": 1000, "edge_color": 0, "metallic": 0.5, "base_color": 1 }"#,
+        r#"{ "diffuse_roughness": 1, "clearcoat": 1, "clearcoat_color": 0, "clearcoat_darkening": 1, "base_color": 1 }"#,
+        r#"{ "transmission": 1, "roughness": 0.5, "ior": 1, "clearcoat": 1, "sheen": 1 }"#,
     ] {
         let k = surface(params);
         for (i, &wo) in all.iter().enumerate() {

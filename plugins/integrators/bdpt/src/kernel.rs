@@ -2,10 +2,12 @@
 
 use resolvent_api::abi::{PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
+use resolvent_api::params::Host;
 use resolvent_api::rng::Stream;
 use resolvent_api::{Output, SceneView, VertexKind};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
+use resolvent_pathspace::orders::Tally;
 use resolvent_pathspace::sampler::Purpose;
 use resolvent_pathspace::samples;
 
@@ -19,13 +21,24 @@ pub struct Kernel<'a> {
     pub connections: f32,
     /// How weights are made.
     pub heuristic: Heuristic,
+    /// What they take for media.
+    pub media: MediaDensities,
+    /// Recompute all paths.
+    pub verify: bool,
+    /// Where a difference is reported.
+    pub host: Host,
     /// Only strategies with this many vertices from the light, and from the sensor.
     pub only: [Option<usize>; 2],
 }
 
 impl Kernel<'_> {
     /// Renders a piece of work.
-    pub fn tile<const CHROMATIC: bool>(&self, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
+    pub fn tile<const CHROMATIC: bool, T: Tally>(
+        &self,
+        tile: &Tile,
+        out: &mut Output<'_>,
+        tally: T,
+    ) -> Outcome<()> {
         let [x0, y0, x1, y1] = tile.window;
         let walks = f64::from(x1 - x0) * f64::from(y1 - y0);
         // Without lights worth connecting to (a constant sky around a cloud), scattering finds them.
@@ -34,20 +47,25 @@ impl Kernel<'_> {
         } else {
             Heuristic::Alone
         };
-        let mut paths = Bidirectional::new(walks, heuristic);
-        samples::each(tile, out, |out, p| {
+        let mut paths = Bidirectional::new(walks, heuristic, self.media).verify(self.verify);
+        let done = samples::each(tile, out, tally, |out, tally, p| {
             let mut draws = NetDraws::new(tile.seed, p.index, p.sample, self.scene.lanes());
             let wanted = tile.features != 0;
-            self.sample::<CHROMATIC>(&mut paths, p.pixel, &mut draws, wanted, out)
-        })
+            self.sample::<CHROMATIC, T>(&mut paths, p.pixel, &mut draws, wanted, tally, out)
+        });
+        if let Some(difference) = paths.difference() {
+            self.host.fail(difference);
+        }
+        done
     }
 
-    fn sample<const CHROMATIC: bool>(
+    fn sample<const CHROMATIC: bool, T: Tally>(
         &self,
         paths: &mut Bidirectional,
         pixel: [u32; 2],
         draws: &mut NetDraws,
         wanted: bool,
+        tally: &mut T,
         out: &mut Output<'_>,
     ) -> Outcome<PixelSample> {
         let scene = self.scene;
@@ -64,34 +82,42 @@ impl Kernel<'_> {
             paths.light.clear();
         }
         if self.wants(0, 2) {
-            sample.radiance += paths.sensor.emitted;
+            for (order, emitted) in paths.sensor.emitted.iter().enumerate() {
+                sample.radiance += *emitted;
+                tally.add(order, *emitted);
+            }
         }
         for t in 2..=paths.sensor.len() {
             if self.wants(0, t) {
-                sample.radiance += paths.hit(scene, t)?;
+                let light = paths.hit(scene, t)?;
+                sample.radiance += light;
+                tally.add(t - 2, light);
             }
             if t < limit && self.wants(1, t) && self.connects() {
-                sample.radiance += paths.next_event(scene, t, draws)?;
+                let light = paths.next_event(scene, t, draws)?;
+                sample.radiance += light;
+                tally.add(t - 1, light);
             }
         }
         for s in 2..=paths.light.len() {
             if self.wants(s, 1)
                 && let Some(splat) = paths.project(scene, s, draws)?
             {
-                out.splat(splat.film, splat.radiance)?;
+                tally.splat(out, splat.film, splat.radiance, s - 1)?;
             }
         }
-        self.join_all(paths, draws, limit, &mut sample)?;
+        self.join_all(paths, draws, limit, tally, &mut sample)?;
         Ok(sample)
     }
 
     /// Joins every vertex of the sensor's walk to some of the light's. Long walks have too many pairs: each is kept with the
     /// same probability.
-    fn join_all(
+    fn join_all<T: Tally>(
         &self,
         paths: &mut Bidirectional,
         draws: &mut NetDraws,
         limit: usize,
+        tally: &mut T,
         sample: &mut PixelSample,
     ) -> Outcome<()> {
         let inner = paths.light.len().saturating_sub(1);
@@ -111,8 +137,9 @@ impl Kernel<'_> {
                 if share < 1.0 && choice.uniform() >= share {
                     continue;
                 }
-                let joined = paths.join(self.scene, s, t, draws)?;
-                sample.radiance += joined * (1.0 / share);
+                let light = paths.join(self.scene, s, t, draws)? * (1.0 / share);
+                sample.radiance += light;
+                tally.add(s + t - 2, light);
             }
         }
         Ok(())

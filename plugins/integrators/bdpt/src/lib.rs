@@ -9,7 +9,11 @@
 //! | `max_depth` | int ≥ −1 | −1 | scattering events of a path, −1: any number. A limit makes the picture darker than it should be |
 //! | `connections` | float > 0 | 4 | vertices of the light's walk that a vertex of the sensor's is joined to, on average; the picture's mean does not depend on it |
 //! | `heuristic` | `balance`, `power`, `alone` | `balance` | how the strategies' densities make weights; `alone`: the one strategy asked for is the only one |
+//! | `media_weights` | `exact`, `depth` | `exact` | what they take for media: the densities of null collisions as they came about, or smooth ones of an approximate optical depth |
+//! | `verify` | bool | false | recompute every path from scratch, and end with an error that names the path and both figures if they differ; several times slower |
 //! | `s`, `t` | int ≥ −1 | −1 | only the strategy with so many vertices from the light and from the sensor, −1: all |
+//!
+//! With `s` and `t` the picture of one strategy is seen, weighted as it is in the sum: the pictures of all pairs add up to that of all.
 //!
 //! ```json
 //! { "integrator": { "plugin": "bdpt", "params": { "max_depth": -1 } } }
@@ -20,15 +24,20 @@ mod kernel;
 use kernel::Kernel;
 use resolvent_api::abi::{ParamDecl, Tile};
 use resolvent_api::integrator::Outcome;
+use resolvent_api::params::Host;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
+use resolvent_pathspace::orders::{Orders, Together};
 
 /// The integrator.
 struct Bidirectional {
     max_depth: u32,
     connections: f32,
     heuristic: Heuristic,
+    media: MediaDensities,
+    verify: bool,
     only: [Option<usize>; 2],
+    host: Host,
 }
 
 impl Plugin for Bidirectional {
@@ -53,6 +62,19 @@ impl Plugin for Bidirectional {
         )
         .default("\"balance\"")
         .build(),
+        Decl::choice(
+            "media_weights",
+            "exact|depth",
+            "what weights take for media: null collisions as they came about, or an approximate depth",
+        )
+        .default("\"exact\"")
+        .build(),
+        Decl::bool(
+            "verify",
+            "recompute every path from scratch, and stop where that differs",
+        )
+        .default("false")
+        .build(),
         Decl::int(
             "s",
             "only strategies with this many vertices from the light; -1: all",
@@ -76,10 +98,23 @@ impl Plugin for Bidirectional {
             Some("alone") => Heuristic::Alone,
             _ => Heuristic::Balance,
         };
+        let media = match params.text("media_weights").as_deref() {
+            Some("depth") => MediaDensities::Depth,
+            _ => MediaDensities::Exact,
+        };
+        let verify = params.bool("verify")?;
+        if verify && heuristic == Heuristic::Alone {
+            return Err(Error::new(
+                "verify needs strategies that are weighed against each other: heuristic must not be \"alone\"",
+            ));
+        }
         Ok(Self {
             max_depth: u32::try_from(params.int("max_depth")?).unwrap_or(u32::MAX),
             connections: params.float("connections")? as f32,
             heuristic,
+            media,
+            verify,
+            host: params.host(),
             only: [count("s")?, count("t")?],
         })
     }
@@ -92,13 +127,17 @@ impl Integrator for Bidirectional {
             max_depth: self.max_depth,
             connections: self.connections,
             heuristic: self.heuristic,
+            media: self.media,
+            verify: self.verify,
             only: self.only,
+            host: self.host,
         };
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
-        if scene.is_grey() {
-            kernel.tile::<false>(tile, out)
-        } else {
-            kernel.tile::<true>(tile, out)
+        match (scene.is_grey(), out.orders()) {
+            (true, 0) => kernel.tile::<false, _>(tile, out, Together),
+            (true, n) => kernel.tile::<false, _>(tile, out, Orders::new(n)),
+            (false, 0) => kernel.tile::<true, _>(tile, out, Together),
+            (false, n) => kernel.tile::<true, _>(tile, out, Orders::new(n)),
         }
     }
 }

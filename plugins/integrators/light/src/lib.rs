@@ -16,7 +16,8 @@ use resolvent_api::abi::{ParamDecl, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
 use resolvent_pathspace::bidirectional::{Bidirectional, NetDraws};
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
+use resolvent_pathspace::orders::{Orders, Tally, Together};
 use resolvent_pathspace::samples;
 
 /// The integrator.
@@ -43,26 +44,28 @@ impl Plugin for ParticleTracer {
 
 impl Integrator for ParticleTracer {
     fn render(&self, scene: &SceneView<'_>, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
-        if scene.is_grey() {
-            self.tile::<false>(scene, tile, out)
-        } else {
-            self.tile::<true>(scene, tile, out)
+        match (scene.is_grey(), out.orders()) {
+            (true, 0) => self.tile::<false, _>(scene, tile, out, Together),
+            (true, n) => self.tile::<false, _>(scene, tile, out, Orders::new(n)),
+            (false, 0) => self.tile::<true, _>(scene, tile, out, Together),
+            (false, n) => self.tile::<true, _>(scene, tile, out, Orders::new(n)),
         }
     }
 }
 
 impl ParticleTracer {
-    fn tile<const CHROMATIC: bool>(
+    fn tile<const CHROMATIC: bool, T: Tally>(
         &self,
         scene: &SceneView<'_>,
         tile: &Tile,
         out: &mut Output<'_>,
+        tally: T,
     ) -> Outcome<()> {
-        let mut paths = Bidirectional::new(1.0, Heuristic::Alone);
+        let mut paths = Bidirectional::new(1.0, Heuristic::Alone, MediaDensities::Exact);
         let emits = scene.has(scene_traits::LIGHTS) || scene.has(scene_traits::HITTABLE_LIGHTS);
         // The light's own vertex, and one for each scattering.
         let limit = (self.max_depth as usize).saturating_add(1);
-        samples::each(tile, out, |out, p| {
+        samples::each(tile, out, tally, |out, tally, p| {
             let mut draws = NetDraws::new(tile.seed, p.index, p.sample, scene.lanes());
             if emits {
                 paths
@@ -71,7 +74,7 @@ impl ParticleTracer {
             }
             for s in 1..=paths.light.len() {
                 if let Some(splat) = paths.project(scene, s, &mut draws)? {
-                    out.splat(splat.film, splat.radiance)?;
+                    tally.splat(out, splat.film, splat.radiance, s - 1)?;
                 }
             }
             // The camera's ray finds lights at infinity, if it does not scatter before.
@@ -80,6 +83,7 @@ impl ParticleTracer {
             let behind = paths.sensor.nodes().get(1);
             if behind.is_some_and(|n| n.vertex.is_infinite()) {
                 sample.radiance = paths.hit(scene, 2)?;
+                tally.add(0, sample.radiance);
             }
             Ok(sample)
         })

@@ -5,8 +5,9 @@ use resolvent_api::integrator::Outcome;
 use resolvent_api::rng::{Stream, derive, mix};
 use resolvent_api::{Output, SceneView, Spectrum};
 use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
-use resolvent_pathspace::chain::Chain;
-use resolvent_pathspace::mis::Heuristic;
+use resolvent_pathspace::chain::{Chain, Sizes};
+use resolvent_pathspace::mis::{Heuristic, MediaDensities};
+use resolvent_pathspace::orders::Tally;
 use resolvent_pathspace::sampler::Purpose;
 use resolvent_pathspace::samples;
 
@@ -17,12 +18,14 @@ pub struct Settings {
     pub max_depth: u32,
     /// Share of large steps.
     pub large_steps: f32,
-    /// Standard deviation of small steps.
-    pub sigma: f32,
+    /// Standard deviations of small steps.
+    pub sizes: Sizes,
     /// Each number of scattering events is proposed this much less often than the one before.
     pub ratio: f64,
     /// Independent paths for each step.
     pub seeds: f64,
+    /// Recompute all paths.
+    pub verify: bool,
 }
 
 /// What a state of the chain carries to the film.
@@ -30,6 +33,8 @@ pub struct Settings {
 struct Sample {
     film: [f32; 2],
     radiance: Spectrum,
+    /// How often it was scattered.
+    order: usize,
     /// The scalar that the chain follows.
     importance: f64,
 }
@@ -58,22 +63,29 @@ impl<'a> Kernel<'a> {
         } else {
             Heuristic::Alone
         };
-        let paths = Bidirectional::new(area, heuristic);
+        let paths = Bidirectional::new(area, heuristic, MediaDensities::Exact);
+        let paths = paths.verify(settings.verify);
         Self {
             scene,
             settings,
             paths,
-            chain: Chain::new(settings.sigma, scene.lanes()),
+            chain: Chain::new(settings.sizes, scene.lanes()),
             corner: [x0 - m, y0 - m],
             extent,
         }
     }
 
+    /// What was found to differ when it was recomputed.
+    pub fn difference(&self) -> Option<&str> {
+        self.paths.difference()
+    }
+
     /// Renders a piece of work: as many steps as it has samples.
-    pub fn piece<const CHROMATIC: bool>(
+    pub fn piece<const CHROMATIC: bool, T: Tally>(
         &mut self,
         tile: &Tile,
         out: &mut Output<'_>,
+        tally: T,
     ) -> Outcome<()> {
         let samples = tile.sample_end - tile.sample_begin;
         let pixels = (tile.max[0] - tile.min[0]) * (tile.max[1] - tile.min[1]);
@@ -83,15 +95,16 @@ impl<'a> Kernel<'a> {
             derive(mix(tile.seed ^ 0x6d6c_7400), place),
             u64::from(tile.sample_begin),
         );
-        self.chain::<CHROMATIC>(key, steps, out)?;
-        self.cover::<CHROMATIC>(tile, out)
+        self.chain::<CHROMATIC, T>(key, steps, out, &tally)?;
+        self.cover::<CHROMATIC, T>(tile, out, tally)
     }
 
-    fn chain<const CHROMATIC: bool>(
+    fn chain<const CHROMATIC: bool, T: Tally>(
         &mut self,
         key: u64,
         steps: u64,
         out: &mut Output<'_>,
+        tally: &T,
     ) -> Outcome<()> {
         let seeds = ((steps as f64 * self.settings.seeds) as u64).max(1);
         let mut weights = Vec::with_capacity(seeds as usize);
@@ -126,18 +139,18 @@ impl<'a> Kernel<'a> {
             if let Some(p) = proposed
                 && f64::from(self.chain.uniform()) < accept
             {
-                record(out, &current, mean * kept)?;
+                record(out, tally, &current, mean * kept)?;
                 self.chain.accept();
                 current = p;
                 kept = accept;
             } else {
                 if let Some(p) = proposed {
-                    record(out, &p, mean * accept)?;
+                    record(out, tally, &p, mean * accept)?;
                 }
                 self.chain.reject();
             }
         }
-        record(out, &current, mean * kept)
+        record(out, tally, &current, mean * kept)
     }
 
     /// The path of the chain's state; `None` if it carries nothing.
@@ -168,6 +181,7 @@ impl<'a> Kernel<'a> {
             (importance > 0.0 && importance.is_finite()).then_some(Sample {
                 film,
                 radiance,
+                order: vertices - 2,
                 importance,
             })
         }))
@@ -203,8 +217,10 @@ impl<'a> Kernel<'a> {
             .sensor
             .from_sensor::<CHROMATIC, _>(scene, &ray, chain, t)?;
         let mut radiance = Spectrum::ZERO;
-        if s == 0 && paths.sensor.edges == t - 1 {
-            radiance += paths.sensor.last_emitted;
+        if s == 0
+            && let Some(emitted) = paths.sensor.emitted.get(t - 2)
+        {
+            radiance += *emitted;
         }
         if paths.sensor.len() == t {
             radiance += match s {
@@ -220,26 +236,36 @@ impl<'a> Kernel<'a> {
 
     /// The samples of the piece's own pixels: light that was not scattered, which chains are bad at (it is bright and found at
     /// once), and the features of the picture.
-    fn cover<const CHROMATIC: bool>(&mut self, tile: &Tile, out: &mut Output<'_>) -> Outcome<()> {
+    fn cover<const CHROMATIC: bool, T: Tally>(
+        &mut self,
+        tile: &Tile,
+        out: &mut Output<'_>,
+        tally: T,
+    ) -> Outcome<()> {
         let (scene, paths) = (self.scene, &mut self.paths);
-        samples::each(tile, out, |_, p| {
+        samples::each(tile, out, tally, |_, tally, p| {
             let mut draws = NetDraws::new(tile.seed, p.index, p.sample, scene.lanes());
             let wanted = tile.features != 0;
             let mut sample = paths.look::<CHROMATIC, _>(scene, p.pixel, &mut draws, 2, wanted)?;
-            sample.radiance = paths.sensor.emitted;
+            sample.radiance = paths
+                .sensor
+                .emitted
+                .iter()
+                .fold(Spectrum::ZERO, |a, e| a + *e);
             if paths.sensor.len() > 1 {
                 sample.radiance += paths.hit(scene, 2)?;
             }
+            tally.add(0, sample.radiance);
             Ok(sample)
         })
     }
 }
 
 /// Adds a state to the film with its share of the steps, `weight` in units of the chain's mean.
-fn record(out: &mut Output<'_>, s: &Sample, weight: f64) -> Outcome<()> {
+fn record<T: Tally>(out: &mut Output<'_>, tally: &T, s: &Sample, weight: f64) -> Outcome<()> {
     if weight > 0.0 {
         let scale = (weight / s.importance) as f32;
-        out.splat(s.film, s.radiance * scale)?;
+        tally.splat(out, s.film, s.radiance * scale, s.order)?;
     }
     Ok(())
 }

@@ -16,6 +16,7 @@ use resolvent_api::operator::{Mode, Scatter, lobes};
 use resolvent_api::vertex::{Edge, vertex_flags};
 use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
 use resolvent_pathspace::mis::Throughput;
+use resolvent_pathspace::orders::Tally;
 use resolvent_pathspace::sampler::{Bounce, Sampler};
 use resolvent_pathspace::{features, roulette, scatter};
 
@@ -25,8 +26,6 @@ pub struct Kernel<'a> {
     pub scene: &'a SceneView<'a>,
     /// Scattering events after which a path ends.
     pub max_depth: u32,
-    /// Keep only light scattered exactly this often.
-    pub order: Option<u32>,
     /// Direction towards the sun, if walks branch.
     pub sun: Option<Vec3>,
     /// Probability c of a branch.
@@ -62,11 +61,12 @@ struct Walk {
 
 impl Kernel<'_> {
     /// Traces the path of one sample of a pixel.
-    pub fn path<const CHROMATIC: bool>(
+    pub fn path<const CHROMATIC: bool, T: Tally>(
         &self,
         sampler: &Sampler,
         pixel: [u32; 2],
         wants_features: bool,
+        tally: &mut T,
     ) -> Outcome<PixelSample> {
         let mut out = PixelSample::default();
         let lanes = self.scene.lanes();
@@ -92,15 +92,16 @@ impl Kernel<'_> {
         let met = alive.then_some(&*next);
         features::fill(&mut out, met, &edge, lanes, wants_features);
         out.radiance = if self.sun.is_some() {
-            self.follow::<CHROMATIC, true>(walk, sampler, alive, &mut edge, here, next)?
+            self.follow::<CHROMATIC, true, T>(walk, sampler, alive, &mut edge, here, next, tally)?
         } else {
-            self.follow::<CHROMATIC, false>(walk, sampler, alive, &mut edge, here, next)?
+            self.follow::<CHROMATIC, false, T>(walk, sampler, alive, &mut edge, here, next, tally)?
         };
         Ok(out)
     }
 
     /// Follows a walk from the edge it is on to its end; the light it finds.
-    fn follow<'v, const CHROMATIC: bool, const BRANCHES: bool>(
+    #[allow(clippy::too_many_arguments)]
+    fn follow<'v, const CHROMATIC: bool, const BRANCHES: bool, T: Tally>(
         &self,
         mut walk: Walk,
         sampler: &Sampler,
@@ -108,6 +109,7 @@ impl Kernel<'_> {
         edge: &mut Edge,
         mut here: &'v mut Vertex,
         mut next: &'v mut Vertex,
+        tally: &mut T,
     ) -> Outcome<Spectrum> {
         let scene = self.scene;
         let lanes = scene.lanes();
@@ -116,20 +118,25 @@ impl Kernel<'_> {
         let mut light = Spectrum::ZERO;
         loop {
             let share = 1.0 / (1.0 + walk.others);
-            if emissive && self.keeps(walk.depth) {
-                light += walk.beta.f * edge.emitted * share;
+            let order = walk.depth as usize;
+            if emissive {
+                let emitted = walk.beta.f * edge.emitted * share;
+                light += emitted;
+                tally.add(order, emitted);
             }
             if !alive {
                 break;
             }
             let medium = next.is(VertexKind::Medium);
-            if !medium && next.flags & vertex_flags::EMITS != 0 && self.keeps(walk.depth) {
+            if !medium && next.flags & vertex_flags::EMITS != 0 {
                 let other = match walk.found {
                     Found::With(density) if connects => scene.light_density(here, next) / density,
                     _ => 0.0,
                 };
                 let found = walk.beta.found::<CHROMATIC>(edge, other, lanes);
-                light += found * next.emitted * share;
+                let found = found * next.emitted * share;
+                light += found;
+                tally.add(order, found);
             }
             if next.is(VertexKind::Emitter) {
                 break;
@@ -148,11 +155,13 @@ impl Kernel<'_> {
             }
             let bounce = sampler.bounce(walk.depth, walk.shared);
             walk.shared = bounce.next;
-            if connects && self.keeps(walk.depth + 1) {
-                light += self.connect::<CHROMATIC>(here, &walk, sampler, &bounce)? * share;
+            if connects {
+                let connected = self.connect::<CHROMATIC>(here, &walk, sampler, &bounce)? * share;
+                light += connected;
+                tally.add(order + 1, connected);
             }
             if BRANCHES && medium {
-                light += self.branch::<CHROMATIC>(here, &walk, sampler)?;
+                light += self.branch::<CHROMATIC, T>(here, &walk, sampler, tally)?;
             }
             let Some(s) = scatter::sample(scene, here, bounce.scatter, Mode::Radiance)? else {
                 break;
@@ -201,11 +210,12 @@ impl Kernel<'_> {
 
     /// Perhaps sends a branch from `here` towards the sun; the light it finds.
     #[inline(always)]
-    fn branch<const CHROMATIC: bool>(
+    fn branch<const CHROMATIC: bool, T: Tally>(
         &self,
         here: &Vertex,
         walk: &Walk,
         sampler: &Sampler,
+        tally: &mut T,
     ) -> Outcome<Spectrum> {
         let Some(sun) = self.sun else {
             return Ok(Spectrum::ZERO);
@@ -238,13 +248,8 @@ impl Kernel<'_> {
         let mut edge = Edge::default();
         let flight = sampler.flight(walk.depth, walk.beta.p);
         let alive = scene.propagate(here, wi, &flight, &mut edge, &mut second)?;
-        self.follow::<CHROMATIC, false>(walk, &sampler, alive, &mut edge, &mut first, &mut second)
-    }
-
-    /// True if light scattered `order` times is wanted.
-    #[inline(always)]
-    fn keeps(&self, order: u32) -> bool {
-        self.order.is_none_or(|o| o == order)
+        let (here, next) = (&mut first, &mut second);
+        self.follow::<CHROMATIC, false, T>(walk, &sampler, alive, &mut edge, here, next, tally)
     }
 
     /// Light that reaches `here` straight from a light chosen at random.

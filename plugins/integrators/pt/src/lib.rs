@@ -8,7 +8,6 @@
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events after which a path ends, −1: none. A limit makes the picture darker than it should be |
 //! | `branching` | float 0…1 | 0.25 | probability of a branch towards the sun at a vertex in a medium; the picture's mean does not depend on it |
-//! | `orders` | int ≥ −1 | −1 | only light scattered exactly this often is kept, −1: all |
 //!
 //! ```json
 //! { "integrator": { "plugin": "pt", "params": { "max_depth": -1 } } }
@@ -20,13 +19,13 @@ use kernel::Kernel;
 use resolvent_api::abi::{ParamDecl, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::{Decl, Error, Integrator, Output, Params, Plugin, SceneView};
+use resolvent_pathspace::orders::{Orders, Tally, Together};
 use resolvent_pathspace::sampler::Sampler;
-use resolvent_pathspace::samples::{self, Place};
+use resolvent_pathspace::samples;
 
 /// The integrator.
 struct PathTracer {
     max_depth: u32,
-    order: Option<u32>,
     branching: f32,
 }
 
@@ -37,13 +36,6 @@ impl Plugin for PathTracer {
         Decl::int(
             "max_depth",
             "scattering events after which a path ends; -1: no limit",
-        )
-        .default("-1")
-        .at_least(-1.0)
-        .build(),
-        Decl::int(
-            "orders",
-            "keep only light scattered exactly this often; -1: all",
         )
         .default("-1")
         .at_least(-1.0)
@@ -59,12 +51,8 @@ impl Plugin for PathTracer {
     ];
 
     fn create(params: &Params<'_>) -> Result<Self, Error> {
-        let unlimited = |v: i64| u32::try_from(v).ok();
-        let order = unlimited(params.int("orders")?);
-        let limit = unlimited(params.int("max_depth")?).unwrap_or(u32::MAX);
         Ok(Self {
-            max_depth: limit.min(order.unwrap_or(u32::MAX)),
-            order,
+            max_depth: u32::try_from(params.int("max_depth")?).unwrap_or(u32::MAX),
             branching: params.float("branching")? as f32,
         })
     }
@@ -78,26 +66,32 @@ impl Integrator for PathTracer {
         let kernel = Kernel {
             scene,
             max_depth: self.max_depth,
-            order: self.order,
             sun,
             branching: self.branching,
         };
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
-        let wanted = tile.features != 0;
-        let vacuum = !scene.has(scene_traits::MEDIA);
-        let sampler = |p: Place| {
-            Sampler::new(tile.seed, p.index, p.sample, scene.lanes()).without_flights(vacuum)
-        };
-        if scene.is_grey() {
-            samples::each(tile, out, |_, p| {
-                kernel.path::<false>(&sampler(p), p.pixel, wanted)
-            })
-        } else {
-            samples::each(tile, out, |_, p| {
-                kernel.path::<true>(&sampler(p), p.pixel, wanted)
-            })
+        match (scene.is_grey(), out.orders()) {
+            (true, 0) => tile_of::<false, _>(&kernel, tile, out, Together),
+            (true, n) => tile_of::<false, _>(&kernel, tile, out, Orders::new(n)),
+            (false, 0) => tile_of::<true, _>(&kernel, tile, out, Together),
+            (false, n) => tile_of::<true, _>(&kernel, tile, out, Orders::new(n)),
         }
     }
+}
+
+fn tile_of<const CHROMATIC: bool, T: Tally>(
+    kernel: &Kernel<'_>,
+    tile: &Tile,
+    out: &mut Output<'_>,
+    tally: T,
+) -> Outcome<()> {
+    let scene = kernel.scene;
+    let (wanted, vacuum) = (tile.features != 0, !scene.has(scene_traits::MEDIA));
+    samples::each(tile, out, tally, |_, tally, p| {
+        let sampler = Sampler::new(tile.seed, p.index, p.sample, scene.lanes());
+        let sampler = sampler.without_flights(vacuum);
+        kernel.path::<CHROMATIC, T>(&sampler, p.pixel, wanted, tally)
+    })
 }
 
 resolvent_api::export_plugin!(integrator, PathTracer);

@@ -232,7 +232,10 @@ impl Plan<'_> {
     fn appearance(&self) -> Result<Appearance, Error> {
         let s = self.settings;
         let channel = |source: &crate::channel::Source, limit: f32| {
-            Channel::load(self.file, source, limit, s.trilinear, self.services)
+            let other = source.file.as_ref().map(File::open).transpose();
+            let other = other.map_err(|e| Error::new(e.to_string()))?;
+            let file = other.as_ref().unwrap_or(self.file);
+            Channel::load(file, source, limit, s.trilinear, self.services)
         };
         let mut appearance = Appearance {
             albedo: s.albedo,

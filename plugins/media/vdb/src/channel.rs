@@ -16,6 +16,23 @@ pub struct Source {
     pub scale: f64,
     /// Summand, after the factor.
     pub offset: f64,
+    /// The file it is in, if that is not the density's.
+    pub file: Option<String>,
+    /// From the grid's world, after its own transform, to the density's.
+    pub transform: Affine,
+}
+
+impl Source {
+    /// The grid as the density's file has it.
+    pub fn new(grid: impl Into<String>) -> Self {
+        Self {
+            grid: grid.into(),
+            scale: 1.0,
+            offset: 0.0,
+            file: None,
+            transform: Affine::IDENTITY,
+        }
+    }
 }
 
 enum Data {
@@ -67,13 +84,20 @@ impl Channel {
             offset: source.offset,
             limit,
         };
+        let place = source.transform;
+        if place.inverse().is_none() {
+            return Err(Error::new(format!(
+                "the transform given for the grid '{}' has no inverse",
+                source.grid
+            )));
+        }
         let cover = Cover::default();
         let vector = info.value_type.is_some_and(|t| t.components() == 3);
         let real = matches!(info.value_type, Some(ValueType::Float | ValueType::Double));
         let halves = real && info.saved_as_half && values.scale >= 0.0 && values.offset == 0.0;
         if vector {
             let loaded = load::load(file, info, values, trilinear, cover, services)?;
-            Ok(Self::new(loaded, Data::Vector, 1.0))
+            Ok(Self::new(loaded, &place, Data::Vector, 1.0))
         } else if halves {
             let limit = (f64::from(limit) / values.scale) as f32;
             let raw = Values {
@@ -82,18 +106,24 @@ impl Channel {
                 limit,
             };
             let loaded = load::load(file, info, raw, trilinear, cover, services)?;
-            Ok(Self::new(loaded, Data::Half, values.scale as f32))
+            Ok(Self::new(loaded, &place, Data::Half, values.scale as f32))
         } else {
             let loaded = load::load(file, info, values, trilinear, cover, services)?;
-            Ok(Self::new(loaded, Data::Scalar, 1.0))
+            Ok(Self::new(loaded, &place, Data::Scalar, 1.0))
         }
     }
 
-    fn new<V: Voxel>(loaded: Loaded<V>, data: impl FnOnce(Grid<V>) -> Data, factor: f32) -> Self {
+    fn new<V: Voxel>(
+        loaded: Loaded<V>,
+        place: &Affine,
+        data: impl FnOnce(Grid<V>) -> Data,
+        factor: f32,
+    ) -> Self {
         let shift = local_shift(&loaded.grid);
+        let index_to_world = place.after(&loaded.to_world);
         Self {
-            to_world: loaded.to_world.after(&shift),
-            index_to_world: loaded.to_world,
+            to_world: index_to_world.after(&shift),
+            index_to_world,
             domain: loaded.domain,
             data: data(loaded.grid),
             factor,

@@ -13,6 +13,8 @@
 //! | `density_scale`, `density_offset` | float | | 1, 0 | applied to the grid's values |
 //! | `albedo_grid`, `color_grid` | text | | none | float or vector grids that multiply the albedo |
 //! | `…_scale`, `…_offset` | float | | 1, 0 | applied to their values, which are then limited to 0..1 |
+//! | `…_file` | file | | the density's | file of the albedo, colour, `temperature` or emission grid |
+//! | `…_transform` | 12 numbers | | identity | rows of the map from that grid's world to the density's, after its own transform |
 //! | `temperature_grid` | text | | none | emits as a black body at these temperatures |
 //! | `temperature_scale`, `temperature_offset` | float | K | 1, 0 | to kelvin |
 //! | `emission_scale` | float ≥ 0 | 1/length | 1 | emission = this × absolute black-body radiance ([`blackbody`]) |

@@ -39,6 +39,12 @@ pub const PARAMS: &[ParamDecl] = &[
     )
     .default("0")
     .build(),
+    Decl::file("albedo_grid_file", "its file, if not the density's").build(),
+    Decl::numbers(
+        "albedo_grid_transform",
+        "three rows of four: from its world, after the grid's own transform, to the density's",
+    )
+    .build(),
     Decl::text(
         "color_grid",
         "name of another grid that multiplies the albedo",
@@ -52,6 +58,12 @@ pub const PARAMS: &[ParamDecl] = &[
         "added after the factor; the result is limited to 0..1",
     )
     .default("0")
+    .build(),
+    Decl::file("color_grid_file", "its file, if not the density's").build(),
+    Decl::numbers(
+        "color_grid_transform",
+        "three rows of four: from its world, after the grid's own transform, to the density's",
+    )
     .build(),
     Decl::text(
         "temperature_grid",
@@ -69,6 +81,12 @@ pub const PARAMS: &[ParamDecl] = &[
         .default("0")
         .unit("K")
         .build(),
+    Decl::file("temperature_file", "its file, if not the density's").build(),
+    Decl::numbers(
+        "temperature_transform",
+        "three rows of four: from its world, after the grid's own transform, to the density's",
+    )
+    .build(),
     Decl::float("emission_scale", "black-body radiance emitted per length")
         .default("1")
         .unit("1/length")
@@ -85,6 +103,12 @@ pub const PARAMS: &[ParamDecl] = &[
     Decl::float("emission_grid_offset", "added after the factor")
         .default("0")
         .build(),
+    Decl::file("emission_grid_file", "its file, if not the density's").build(),
+    Decl::numbers(
+        "emission_grid_transform",
+        "three rows of four: from its world, after the grid's own transform, to the density's",
+    )
+    .build(),
     Decl::spectrum("emission", "emission where the emission grid is 1")
         .default("1")
         .unit("W/(sr m^3)")
@@ -149,16 +173,23 @@ pub struct Settings {
     pub lanes: u32,
 }
 
+/// A transform of three rows of four numbers.
+fn placed(name: &str, rows: &[f64]) -> Result<Affine, Error> {
+    match rows.as_chunks::<4>() {
+        ([a, b, c], []) => Ok(Affine::from_rows([*a, *b, *c])),
+        _ => Err(Error::new(format!(
+            "'{name}_transform' must be 12 numbers, three rows of four, not {}",
+            rows.len()
+        ))),
+    }
+}
+
 impl Settings {
     /// With everything but file and grid at its default.
     pub fn new(file: impl Into<String>, grid: &str) -> Self {
         Self {
             file: file.into(),
-            density: Source {
-                grid: grid.into(),
-                scale: 1.0,
-                offset: 0.0,
-            },
+            density: Source::new(grid),
             sigma_t: Spectrum::rgb(1.0, 1.0, 1.0),
             albedo: Spectrum::rgb(1.0, 1.0, 1.0),
             tints: Vec::new(),
@@ -178,42 +209,34 @@ impl Settings {
     /// # Errors
     /// If a value is missing or out of range.
     pub fn read(params: &Params<'_>) -> Result<Self, Error> {
-        let source = |grid: &str, scale: &str, offset: &str| -> Result<Option<Source>, Error> {
-            Ok(match params.text(grid).filter(|name| !name.is_empty()) {
-                Some(grid) => Some(Source {
-                    grid,
-                    scale: params.float(scale)?,
-                    offset: params.float(offset)?,
-                }),
-                None => None,
-            })
+        let source = |grid: &str, name: &str| -> Result<Option<Source>, Error> {
+            let Some(grid) = params.text(grid).filter(|name| !name.is_empty()) else {
+                return Ok(None);
+            };
+            let beside = name != "density";
+            let number = |what: &str| params.float(&format!("{name}_{what}"));
+            let rows = match params.numbers(&format!("{name}_transform")) {
+                Some(rows) if beside => Some(rows),
+                _ => None,
+            };
+            Ok(Some(Source {
+                scale: number("scale")?,
+                offset: number("offset")?,
+                file: params.text(&format!("{name}_file")).filter(|_| beside),
+                transform: rows.map_or(Ok(Affine::IDENTITY), |r| placed(name, r))?,
+                ..Source::new(grid)
+            }))
         };
         let file = params
             .text("file")
             .ok_or_else(|| Error::new("the parameter 'file' has no value"))?;
-        let density = source("grid", "density_scale", "density_offset")?;
+        let density = source("grid", "density")?;
         let mut settings = Self::new(file, "density");
         settings.density = density.ok_or_else(|| Error::new("the parameter 'grid' is empty"))?;
-        settings.tints.extend(source(
-            "albedo_grid",
-            "albedo_grid_scale",
-            "albedo_grid_offset",
-        )?);
-        settings.tints.extend(source(
-            "color_grid",
-            "color_grid_scale",
-            "color_grid_offset",
-        )?);
-        settings.temperature = source(
-            "temperature_grid",
-            "temperature_scale",
-            "temperature_offset",
-        )?;
-        settings.flame = source(
-            "emission_grid",
-            "emission_grid_scale",
-            "emission_grid_offset",
-        )?;
+        settings.tints.extend(source("albedo_grid", "albedo_grid")?);
+        settings.tints.extend(source("color_grid", "color_grid")?);
+        settings.temperature = source("temperature_grid", "temperature")?;
+        settings.flame = source("emission_grid", "emission_grid")?;
         settings.emission_scale = params.float("emission_scale")? as f32;
         for (name, value) in [
             ("sigma_t", &mut settings.sigma_t),

@@ -1,7 +1,9 @@
 //! The fit to Lorenz-Mie scattering by water: four numbers for a diameter.
 //!
 //! Jendersie & d'Eon 2023, "An Approximate Mie Scattering Function for Fog and Cloud Rendering", SIGGRAPH Talks, with its
-//! supplement: eq. 4-7 for 5 to 50 µm, eq. 11-22 for the three ranges of smaller droplets.
+//! supplement, whose numbers are meant here: eq. 7-10 for 5 to 50 µm, which the talk gives as well; eq. 11-14 up to 0.1 µm, 15-18
+//! up to 1.5 µm and 19-22 up to 5 µm. Numbers and constants are those that Blender's Cycles states (phase_mie_fitted_parameters);
+//! all but one of five public implementations have the same constants to the digits they give (one has 13.58 for 13.8).
 
 /// The largest diameter of the fit, µm.
 pub const LARGEST: f64 = 50.0;

@@ -16,8 +16,8 @@ GREY = (0.18, 0.18, 0.18)
 """The fallback of displayColor in OpenUSD's imaging."""
 
 
-def look_of(ctx: Context, claim: Claim, subset: Claim | None = None) -> Look:
-    """The bound material, else one of displayColor."""
+def look_of(ctx: Context, claim: Claim, subset: Claim | None = None, corners: bool = False) -> Look:
+    """The bound material, else one of displayColor; ``corners``: the shape can have colours at its corners."""
     for part in (claim, subset):
         if part is not None:
             part.take_schema("MaterialBindingAPI")
@@ -28,7 +28,25 @@ def look_of(ctx: Context, claim: Claim, subset: Claim | None = None) -> Look:
         claim.take("primvars:displayColor", "primvars:displayColor:indices")
         claim.take("primvars:displayOpacity", "primvars:displayOpacity:indices")
         return look
+    if corners and (_varies(claim, "displayColor") or _varies(claim, "displayOpacity")):
+        return Look({"material": _corner_material(ctx, claim)}, colors=True)
     return Look({"material": display_material(ctx, claim)})
+
+
+def _varies(claim: Claim, name: str) -> bool:
+    primvar = primvars.read(claim, name)
+    return primvar is not None and len(primvar.values) > 1 and bool((primvar.values != primvar.values[0]).any())
+
+
+def _corner_material(ctx: Context, claim: Claim) -> str:
+    """A diffuse material of the colours at the corners; their alpha is the opacity."""
+    color = ctx.scene.texture("displayColor", {"vertex_color": True})
+    material: Json = {"plugin": "diffuse", "params": {"reflectance": {"texture": color}}}
+    opacity = primvars.read(claim, "displayOpacity")
+    if opacity is not None and len(opacity.values) and float(np.min(opacity.values)) < 1.0:
+        alpha = ctx.scene.texture("displayOpacity", {"vertex_color": True, "channel": "a"})
+        material = {"plugin": "mask", "params": {"opacity": {"texture": alpha}, "bsdf": material}}
+    return ctx.scene.material("displayColor", material)
 
 
 def display_material(ctx: Context, claim: Claim) -> str:

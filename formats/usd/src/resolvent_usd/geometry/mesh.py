@@ -135,14 +135,14 @@ def _parts(ctx: Context, claim: Claim, topology: Topology) -> list[tuple[Look, I
             part.approximated("indices", "faces belong to several subsets", "the first subset's material is used there")
             faces = faces[owner[faces] < 0]
         owner[faces] = len(looks)
-        looks.append(look_of(ctx, claim, part))
+        looks.append(look_of(ctx, claim, part, corners=True))
         bound = True
     if not bound:
-        return [(look_of(ctx, claim), None)]
+        return [(look_of(ctx, claim, corners=True), None)]
     parts: list[tuple[Look, Ints | None]] = []
     rest = np.flatnonzero(owner < 0)
     if len(rest):
-        parts.append((look_of(ctx, claim), rest))
+        parts.append((look_of(ctx, claim, corners=True), rest))
     parts += [(look, np.flatnonzero(owner == i)) for i, look in enumerate(looks)]
     return [(look, faces) for look, faces in parts if faces is None or len(faces)]
 
@@ -156,7 +156,7 @@ def emit(ctx: Context, claim: Claim, surface: Surface, look: Look, faces: Ints |
             claim.approximated(
                 f"primvars:{look.uv}", "the material reads it, and the mesh has no such texture coordinates", "(0, 0) everywhere"
             )
-    triangles = surface.triangles(faces, uv)
+    triangles = surface.triangles(faces, uv, surface.colors() if look.colors else None)
     if len(triangles.indices) == 0:
         return
     stem = "".join(c if c.isalnum() else "_" for c in claim.prim.GetName())[:40]

@@ -35,17 +35,30 @@ class Surface:
     flipped: bool
     normals: tuple[Array, Ints] | None
     """Values, and for each corner which."""
-    read_uv: Callable[[str], tuple[Array, Ints] | None]
+    read: Callable[[str, int], tuple[Array, Ints] | None]
+    """A primvar of so many components: values, and for each corner which."""
     _cut: tuple[Ints, Ints] | None = None
     _uvs: dict[str, tuple[Array, Ints] | None] = field(default_factory=dict)
 
     def uv(self, name: str) -> tuple[Array, Ints] | None:
         """Texture coordinates of a primvar: values, and for each corner which."""
         if name not in self._uvs:
-            self._uvs[name] = self.read_uv(name)
+            self._uvs[name] = self.read(name, 2)
         return self._uvs[name]
 
-    def triangles(self, faces: Ints | None, uv: tuple[Array, Ints] | None) -> Triangles:
+    def colors(self) -> tuple[Array, Ints] | None:
+        """Linear RGB and opacity of displayColor and displayOpacity: values, and for each corner which."""
+        color, opacity = self.read("displayColor", 3), self.read("displayOpacity", 1)
+        if color is None and opacity is None:
+            return None
+        count = len(self.indices)
+        rgb = np.full((count, 3), 0.18, dtype=np.float32) if color is None else color[0][color[1]]
+        alpha = np.ones((count, 1), dtype=np.float32) if opacity is None else opacity[0][opacity[1]]
+        return np.clip(np.concatenate([rgb, alpha], axis=1), 0.0, 1.0), np.arange(count)
+
+    def triangles(
+        self, faces: Ints | None, uv: tuple[Array, Ints] | None, colors: tuple[Array, Ints] | None = None
+    ) -> Triangles:
         """The triangles of some faces of the stage's mesh (None: all)."""
         if self._cut is None:
             self._cut = triangulate(self.points, self.counts, self.indices)
@@ -59,14 +72,19 @@ class Surface:
             corners = corners[keep[polygon]]
         if self.flipped:
             corners = corners[:, ::-1]
-        return _welded(self.points, self.indices, corners, self.normals, uv)
+        return _welded(self.points, self.indices, corners, self.normals, uv, colors)
 
 
 def _welded(
-    points: Array, indices: Ints, corners: Ints, normals: tuple[Array, Ints] | None, uv: tuple[Array, Ints] | None
+    points: Array,
+    indices: Ints,
+    corners: Ints,
+    normals: tuple[Array, Ints] | None,
+    uv: tuple[Array, Ints] | None,
+    colors: tuple[Array, Ints] | None,
 ) -> Triangles:
     """Corners that agree in everything become one vertex."""
-    shared = [_shared(*a, indices, len(points)) for a in (normals, uv) if a is not None]
+    shared = [_shared(*a, indices, len(points)) for a in (normals, uv, colors) if a is not None]
     apart = [which for which in shared if which is not None]
     if not apart:
         # Everything hangs on the point.
@@ -76,7 +94,7 @@ def _welded(
         def per_point(a: tuple[Array, Ints] | None) -> Array | None:
             return None if a is None else a[0][a[1][first]]
 
-        return Triangles(points, indices[corners], per_point(normals), per_point(uv))
+        return Triangles(points, indices[corners], per_point(normals), per_point(uv), per_point(colors))
     flat = corners.reshape(-1)
     key = indices[flat]
     for which in apart:
@@ -87,7 +105,7 @@ def _welded(
     def pick(a: tuple[Array, Ints] | None) -> Array | None:
         return None if a is None else a[0][a[1][source]]
 
-    return Triangles(points[indices[source]], inverse.reshape(-1, 3), pick(normals), pick(uv))
+    return Triangles(points[indices[source]], inverse.reshape(-1, 3), pick(normals), pick(uv), pick(colors))
 
 
 def _dense(key: Ints) -> Ints:
@@ -134,7 +152,7 @@ def refine(
         return Surface(
             points, topology.counts, topology.indices, np.arange(len(topology.counts)), shown, flipped,
             None if normals is None else _unit(_flat(normals, topology)),
-            lambda name: _polygon_uv(claim, name, topology),
+            lambda name, width: _polygon_data(claim, name, width, topology),
         )  # fmt: skip
     smooth = scheme != "bilinear"
     cage = rules.cage(topology, points)
@@ -146,7 +164,7 @@ def refine(
         cage = subdivide.limit(cage)
     surface = Surface(
         cage.data.astype(np.float32), cage.counts, cage.indices, cage.face, shown[cage.face], flipped,
-        None, lambda name: _subdivided_uv(claim, name, topology, rules, level, smooth),
+        None, lambda name, width: _subdivided_data(claim, name, width, topology, rules, level, smooth),
     )  # fmt: skip
     if smooth:
         values, which = subdivide.smooth_normals(cage, cage.data)
@@ -255,7 +273,7 @@ def _flat(primvar: Primvar, topology: Topology) -> tuple[Array, Ints]:
             return primvar.values, topology.indices
 
 
-def _uv_primvar(claim: Claim, name: str, topology: Topology) -> Primvar | None:
+def _data_primvar(claim: Claim, name: str, width: int, topology: Topology) -> Primvar | None:
     found = primvars.read(claim, name)
     if found is None:
         return None
@@ -263,23 +281,24 @@ def _uv_primvar(claim: Claim, name: str, topology: Topology) -> Primvar | None:
     if found is None:
         return None
     values = np.asarray(found.values, dtype=np.float32)
-    if values.ndim != 2 or values.shape[1] < 2:
-        claim.skipped(f"primvars:{name}", "texture coordinates have two components", "(0, 0) everywhere")
+    values = values.reshape(len(values), -1)
+    if values.shape[1] < width:
+        claim.skipped(f"primvars:{name}", f"has {values.shape[1]} components, not {width}", "it has no effect")
         return None
-    return Primvar(name, values[:, :2], found.interpolation)
+    return Primvar(name, values[:, :width], found.interpolation)
 
 
-def _polygon_uv(claim: Claim, name: str, topology: Topology) -> tuple[Array, Ints] | None:
-    found = _uv_primvar(claim, name, topology)
+def _polygon_data(claim: Claim, name: str, width: int, topology: Topology) -> tuple[Array, Ints] | None:
+    found = _data_primvar(claim, name, width, topology)
     return None if found is None else _flat(found, topology)
 
 
-def _subdivided_uv(
-    claim: Claim, name: str, topology: Topology, rules: _Rules, level: int, smooth: bool
+def _subdivided_data(
+    claim: Claim, name: str, width: int, topology: Topology, rules: _Rules, level: int, smooth: bool
 ) -> tuple[Array, Ints] | None:
-    """Texture coordinates of a subdivision surface: vertex data is smoothed like points, varying data is linear, faceVarying data
+    """A primvar on a subdivision surface: vertex data is smoothed like points, varying data is linear, faceVarying data
     follows faceVaryingLinearInterpolation."""
-    found = _uv_primvar(claim, name, topology)
+    found = _data_primvar(claim, name, width, topology)
     if found is None:
         return None
     values, which = _flat(found, topology)

@@ -21,6 +21,19 @@ INFINITE = 10.0
 
 
 @dataclass(frozen=True)
+class Edges:
+    """Edges of a mesh."""
+
+    ends: Ints
+    """(e, 2)"""
+    of_corner: Ints
+    """For each corner the edge to the next one."""
+    faces: Ints
+    """How many faces each has."""
+    sharpness: Floats
+
+
+@dataclass(frozen=True)
 class Cage:
     """A control mesh; ``data`` are the points, or any other values that are subdivided like them."""
 
@@ -37,17 +50,8 @@ class Cage:
     """The face of the first cage that each face comes from."""
     corner: Floats | None = None
     """(indices, k): values per corner that are interpolated linearly."""
-
-
-@dataclass(frozen=True)
-class _Edges:
-    """Edges of a mesh: their two vertices, and for each corner the edge to the next one."""
-
-    ends: Ints
-    of_corner: Ints
-    faces: Ints
-    """How many faces each has."""
-    sharpness: Floats
+    known: Edges | None = None
+    """The edges, if they are known: then the creases are in them."""
 
 
 def _starts(counts: Ints) -> Ints:
@@ -61,7 +65,9 @@ def _next(counts: Ints) -> Ints:
     return following
 
 
-def _edges(cage: Cage) -> _Edges:
+def _edges(cage: Cage) -> Edges:
+    if cage.known is not None:
+        return cage.known
     a, b = cage.indices, cage.indices[_next(cage.counts)]
     v = len(cage.data)
     keys, of_corner, faces = np.unique(np.minimum(a, b) * v + np.maximum(a, b), return_inverse=True, return_counts=True)
@@ -75,7 +81,7 @@ def _edges(cage: Cage) -> _Edges:
         np.maximum.at(sharpness, at[found], cage.crease_sharpness[found])
     # Boundaries are creases; so is what more than two faces share.
     sharpness[faces != 2] = INFINITE
-    return _Edges(ends, of_corner.reshape(-1), faces, sharpness)
+    return Edges(ends, of_corner.reshape(-1), faces, sharpness)
 
 
 def _decayed(sharpness: Floats) -> Floats:
@@ -91,13 +97,13 @@ def _face_means(cage: Cage, data: Floats) -> Floats:
     return np.asarray(np.add.reduceat(data[cage.indices], _starts(cage.counts), axis=0) / cage.counts[:, None])
 
 
-def _around(edges: _Edges, values: Floats, chosen: NDArray[np.bool_], size: int) -> Floats:
+def _around(edges: Edges, values: Floats, chosen: NDArray[np.bool_], size: int) -> Floats:
     """For each vertex the sum over its chosen edges of the values at their other ends."""
     e = edges.ends[chosen]
     return _sum_at(e[:, 0], values[e[:, 1]], size) + _sum_at(e[:, 1], values[e[:, 0]], size)
 
 
-def _degree(edges: _Edges, chosen: NDArray[np.bool_], size: int) -> Ints:
+def _degree(edges: Edges, chosen: NDArray[np.bool_], size: int) -> Ints:
     return np.bincount(edges.ends[chosen].reshape(-1), minlength=size)
 
 
@@ -110,14 +116,14 @@ class _Rules:
     crease: NDArray[np.bool_]
 
 
-def _rules(edges: _Edges, edge_sharpness: Floats, corner_sharpness: Floats) -> _Rules:
+def _rules(edges: Edges, edge_sharpness: Floats, corner_sharpness: Floats) -> _Rules:
     sharp = edge_sharpness > 0
     degree = _degree(edges, sharp, len(corner_sharpness))
     corner = (corner_sharpness > 0) | (degree > 2)
     return _Rules(sharp, corner, ~corner & (degree == 2))
 
 
-def _vertex_points(cage: Cage, edges: _Edges, face_points: Floats) -> Floats:
+def _vertex_points(cage: Cage, edges: Edges, face_points: Floats) -> Floats:
     """Where one level moves the vertices."""
     p, size = cage.data, len(cage.data)
     n = np.maximum(_degree(edges, np.ones(len(edges.ends), dtype=bool), size), 1)[:, None].astype(float)
@@ -183,11 +189,6 @@ def step(cage: Cage, smooth: bool = True) -> Cage:
     quads = np.stack(
         [cage.indices, v + edges.of_corner, v + e + face_of_corner, v + edges.of_corner[previous]], axis=1
     )
-    left = edges.sharpness > 0
-    child = _decayed(edges.sharpness)[left]
-    kept = child > 0
-    ends, middle = edges.ends[left][kept], (v + np.flatnonzero(left))[kept]
-    crease_edges = np.concatenate([np.stack([ends[:, i], middle], axis=1) for i in (0, 1)])
     corner = None
     if cage.corner is not None:
         c = cage.corner
@@ -198,11 +199,33 @@ def step(cage: Cage, smooth: bool = True) -> Cage:
         counts=np.full(len(quads), 4),
         indices=quads.reshape(-1),
         data=np.concatenate([vertex_points, edge_points, face_points]),
-        crease_edges=crease_edges,
-        crease_sharpness=np.concatenate([child[kept]] * 2),
+        crease_edges=np.empty((0, 2), dtype=np.int64),
+        crease_sharpness=np.empty(0),
         corner_sharpness=np.concatenate([_decayed(cage.corner_sharpness), np.zeros(e + f)]),
         face=np.repeat(cage.face, cage.counts),
         corner=corner,
+        known=_child_edges(cage, edges, previous, face_of_corner),
+    )
+
+
+def _child_edges(cage: Cage, edges: Edges, previous: Ints, face_of_corner: Ints) -> Edges:
+    """The edges after a level: two halves of each, and from each edge's point to the points of its faces."""
+    v, e, corners = len(cage.data), len(edges.ends), len(cage.indices)
+    middle = v + np.arange(e)
+    halves = np.stack([edges.ends, np.stack([middle, middle], axis=1)], axis=2).reshape(-1, 2)
+    inner = np.stack([v + edges.of_corner, v + e + face_of_corner], axis=1)
+
+    def half(edge: Ints) -> Ints:
+        """The half of an edge that ends at the corner's vertex."""
+        return np.asarray(2 * edge + (cage.indices == edges.ends[edge, 1]))
+
+    ahead, behind = half(edges.of_corner), half(edges.of_corner[previous])
+    across = 2 * e + np.arange(corners)
+    return Edges(
+        ends=np.concatenate([halves, inner]),
+        of_corner=np.stack([ahead, across, across[previous], behind], axis=1).reshape(-1),
+        faces=np.concatenate([np.repeat(edges.faces, 2), np.full(corners, 2)]),
+        sharpness=np.concatenate([np.repeat(_decayed(edges.sharpness), 2), np.zeros(corners)]),
     )
 
 

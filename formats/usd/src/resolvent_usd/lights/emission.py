@@ -77,6 +77,9 @@ def _common(claim: Claim) -> None:
         _link(claim, link, what)
     # Says what shader the light is; of use to renderers that have it.
     claim.take("light:shaderId", "light:materialSyncMode")
+    shader = claim.prim.GetAttribute("light:shaderId")
+    if shader and shader.HasAuthoredValue() and shader.Get() != claim.prim.GetPrimDefinition().GetAttributeFallbackValue("light:shaderId"):
+        claim.skipped("light:shaderId", f"the light shader '{shader.Get()}' is not known", "the light is that of its type")
     for name in claim.prim.GetAuthoredPropertyNames():
         if name.startswith("light:shaderId:"):
             claim.skipped(name, "a light shader of another renderer", "the light is that of its type")

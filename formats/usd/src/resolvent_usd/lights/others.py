@@ -19,7 +19,7 @@ def geometry_light(ctx: Context, claim: Claim) -> None:
     lost = [str(t) for t in targets if not ctx.stage.GetPrimAtPath(t)]
     if lost or not targets:
         what = f"names {', '.join(lost)}, which is not there" if lost else "names no geometry"
-        claim.skipped("geometry", what, "the light is not there")
+        claim.skipped("GeometryLight", what, "the light is not there")
 
 
 @converts("PortalLight")

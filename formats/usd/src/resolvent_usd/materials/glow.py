@@ -40,14 +40,14 @@ def lit(ctx: Context, claim: Claim, look: Look | None, bound: bool) -> Look | No
         light.approximated(
             "light:materialSyncMode", "surfaces show the same emission to all rays", "the mesh is seen as bright as it shines"
         )
-        return Look({**shape, "emission": rgb(color), **shaped} if color.max() > 0.0 else shape, look.uv)
+        return Look({**shape, "emission": rgb(color), **shaped} if color.max() > 0.0 else shape, look.uv, look.colors)
     if glow is None:
         light.approximated(
             "light:materialSyncMode",
             "materialGlowTintsLight: light is the material's glow times the light's, and the material does not glow",
             "the mesh does not shine",
         )
-        return Look(shape, look.uv)
+        return Look(shape, look.uv, look.colors)
     if not np.allclose(color, 1.0):
         light.approximated(
             "light:materialSyncMode", "surfaces show the same emission to all rays", "the mesh is seen as bright as it shines"
@@ -57,7 +57,7 @@ def lit(ctx: Context, claim: Claim, look: Look | None, bound: bool) -> Look | No
         shape |= {"emission": rgb(product), **shaped}
         if texture is not None:
             shape["emission_texture"] = texture
-    return Look(shape, look.uv)
+    return Look(shape, look.uv, look.colors)
 
 
 def _light(ctx: Context, claim: Claim) -> Claim | None:
@@ -68,7 +68,9 @@ def _light(ctx: Context, claim: Claim) -> Claim | None:
     path = targets.get(str(claim.prim.GetPath()))
     if path is None:
         return None
-    return ctx.claim(ctx.stage.GetPrimAtPath(path), claim.matrix, claim.group)
+    light = ctx.claim(ctx.stage.GetPrimAtPath(path), claim.matrix, claim.group)
+    light.take("geometry")
+    return light
 
 
 def _geometry_lights(ctx: Context) -> dict[str, str]:

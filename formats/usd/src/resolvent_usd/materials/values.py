@@ -75,6 +75,8 @@ class Builder:
         """The primvar that textures are read at."""
         self.of_the_prim = False
         """True if the material differs from prim to prim, by its primvars."""
+        self.colors = False
+        """True if it reads the colours at the mesh's corners, displayColor and displayOpacity."""
 
     def read(self, node: Node, name: str, default: Any) -> Value:
         """An input of a shader."""
@@ -285,6 +287,9 @@ class Builder:
             return Value(three(array))
         array = array.reshape(len(array), -1) if len(array) else np.zeros((1, 1))
         if len(array) > 1 and np.ptp(array, axis=0).max() > 0.0:
+            if name in _CORNERS and self.claim.prim.GetTypeName() == "Mesh":
+                self.colors = True
+                return Value(three(array.mean(axis=0)), dict(_CORNERS[name]))
             self.claim.approximated(
                 f"primvars:{name}", f"the material {node.path} reads it, and it varies over the surface", "its mean is shown"
             )
@@ -308,6 +313,7 @@ class Builder:
         return self.ctx.scene.texture(name, texture)
 
 
+_CORNERS: dict[str, Json] = {"displayColor": {"vertex_color": True}, "displayOpacity": {"vertex_color": True, "channel": "a"}}
 _OUTPUTS = {"outr": 0, "outx": 0, "outg": 1, "outy": 1, "outb": 2, "outz": 2, "outa": 3, "outw": 3}
 _WRAPS = {"black": "black", "clamp": "clamp", "repeat": "repeat", "mirror": "mirror"}
 _ADDRESS = {"constant": "black", "clamp": "clamp", "periodic": "repeat", "mirror": "mirror"}

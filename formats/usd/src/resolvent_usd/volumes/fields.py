@@ -52,12 +52,19 @@ def field_prim(ctx: Context, claim: Claim) -> None:
     """Read where a volume names it."""
     claim.take(*_PROPERTIES)
 
+    def unused() -> None:
+        if (claim.path, "filePath") not in ctx.used:
+            ctx.report.note(claim.path, "a field that no volume in the picture has")
+
+    claim.at_end = unused
+
 
 def read(ctx: Context, claim: Claim, name: str, path: Sdf.Path) -> Field | None:
     """The field ``name`` of a volume; None, and reported, for what is no OpenVDB field."""
     prim = ctx.stage.GetPrimAtPath(path)
     if not prim:
         raise InputError(claim.path, f"field:{name} names <{path}>, which is not there")
+    ctx.used.add((str(path), "filePath"))
     kind = str(prim.GetTypeName())
     if kind != "OpenVDBAsset":
         claim.skipped(f"field:{name}", f"{path}: fields of type '{kind}' are not read, only OpenVDBAsset", "the field is missing")

@@ -154,6 +154,10 @@ def _medium(ctx: Context, claim: Claim, fields: dict[str, Field], optics: Optics
     _leftover(claim, fields, params, density)
     out: Json = {"plugin": "vdb", "params": params}
     matrix = claim.matrix @ density.matrix
+    if density.info is not None and density.info.get("bounds_world"):
+        lo, hi = density.info["bounds_world"]
+        box = np.array([[(lo, hi)[i >> k & 1][k] for k in range(3)] for i in range(8)], dtype=float)
+        ctx.corners.append(box @ matrix[:3, :3].T + matrix[:3, 3])
     if not np.array_equal(matrix, np.eye(4)):
         out["transform"] = rows(matrix)
     return out

@@ -7,15 +7,15 @@ use crate::channel::Source;
 use crate::settings::{Choice, Settings};
 use resolvent_api::medium::medium_traits;
 use resolvent_api::rng::Stream;
-use resolvent_api::{Segment, Spectrum, Vec3};
+use resolvent_api::{Affine, Segment, Spectrum, Vec3};
 use resolvent_tests::medium::{check, segment};
 use resolvent_tests::{Moments, Suite, samples};
 
 fn source(grid: &str, scale: f64, offset: f64) -> Option<Source> {
     Some(Source {
-        grid: grid.into(),
         scale,
         offset,
+        ..Source::new(grid)
     })
 }
 
@@ -47,6 +47,38 @@ fn flights_pick_up_what_quadrature_says() {
         );
     }
     suite.assert();
+}
+
+/// A grid of another file, at another place: emission there is what it was where it came from, and the density stays.
+#[test]
+fn grids_of_other_files_have_their_own_place() {
+    let plain = medium(&fire());
+    let mut s = fire();
+    let moved = s.flame.as_mut().unwrap();
+    moved.file = Some(data("corpus/multi_fire.vdb").to_string_lossy().into_owned());
+    moved.transform = Affine::from_rows([
+        [0.0, -2.0, 0.0, 0.3],
+        [2.0, 0.0, 0.0, -0.2],
+        [0.0, 0.0, 2.0, 0.1],
+    ]);
+    let place = moved.transform;
+    let m = medium(&s);
+    let (mut stream, bounds) = (Stream::new(4), plain.info().bounds);
+    let mut bright = 0;
+    for _ in 0..2000 {
+        let u = [stream.uniform(), stream.uniform(), stream.uniform()];
+        let from = Vec3::from(bounds.min) + bounds.extent() * Vec3::from(u);
+        let to = place.point(from.as_dvec3()).as_vec3();
+        let (a, b) = (plain.coefficients(from), m.coefficients(to));
+        let scale = a.emission[0].max(1e-3);
+        assert!(
+            (a.emission[0] - b.emission[0]).abs() < 1e-3 * scale,
+            "{from}"
+        );
+        assert_eq!(plain.coefficients(to).sigma_t, b.sigma_t);
+        bright += u32::from(a.emission[0] > 0.0);
+    }
+    assert!(bright > 20, "{bright}");
 }
 
 #[test]
@@ -107,9 +139,9 @@ fn black_body() {
         let mut s = fire();
         s.flame = None;
         s.density = Source {
-            grid: "temperature".into(),
             scale: 1500.0,
             offset: 600.0,
+            ..Source::new("temperature")
         };
         medium(&s)
     };
@@ -141,18 +173,18 @@ fn tints_multiply_the_albedo() {
     s.flame = None;
     s.albedo = Spectrum::rgb(0.9, 0.6, 0.3);
     s.tints = vec![Source {
-        grid: "flame".into(),
         scale: 0.5,
         offset: 0.25,
+        ..Source::new("flame")
     }];
     let m = medium(&s);
     let flame = {
         let mut s = fire();
         s.flame = None;
         s.density = Source {
-            grid: "flame".into(),
             scale: 0.5,
             offset: 0.25,
+            ..Source::new("flame")
         };
         medium(&s)
     };

@@ -64,12 +64,10 @@ fn errors_say_what_is_wrong() {
     s.albedo = Spectrum::rgb(1.5, 0.0, 0.0);
     assert!(error(&s).contains("albedo"));
     s = corpus("multi_fire.vdb", "density");
-    s.tints = vec![Source {
-        grid: "colour".into(),
-        scale: 1.0,
-        offset: 0.0,
-    }];
+    s.tints = vec![Source::new("colour")];
     assert!(error(&s).contains("colour"));
+    s.tints[0].file = Some("/no/such/tints.vdb".into());
+    assert!(error(&s).contains("/no/such/tints.vdb"));
     assert!(error(&Settings::new("/no/such/file.vdb", "density")).contains("/no/such/file.vdb"));
 }
 
@@ -77,15 +75,11 @@ fn errors_say_what_is_wrong() {
 fn unnamed_grids_are_not_read() {
     let all = {
         let mut s = corpus("multi_fire.vdb", "density");
-        s.flame = Some(Source {
-            grid: "flame".into(),
-            scale: 1.0,
-            offset: 0.0,
-        });
+        s.flame = Some(Source::new("flame"));
         s.temperature = Some(Source {
-            grid: "temperature".into(),
             scale: 1000.0,
             offset: 0.0,
+            ..Source::new("temperature")
         });
         medium(&s).info()
     };
