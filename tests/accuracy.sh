@@ -1,13 +1,16 @@
 #!/bin/sh
-# Makes docs/accuracy.md of what the tests say about themselves. With RESOLVENT_FULL=1 they run everything.
+# Makes docs/accuracy.md of what the tests say about themselves. With RESOLVENT_FULL=1 they run everything. With RESOLVENT_REPORT=DIR it
+# makes the page of what an earlier run of tests left there.
 set -eu
 cd "$(dirname "$0")/.."
-RESOLVENT_REPORT=$(mktemp -d)
-export RESOLVENT_REPORT
-trap 'rm -rf "$RESOLVENT_REPORT"' EXIT
-cargo build --release
-cargo test --release -p resolvent-tests --test physics
-cargo test --release -p resolvent-tests --test cli skips
+if [ -z "${RESOLVENT_REPORT-}" ]; then
+    RESOLVENT_REPORT=$(mktemp -d)
+    export RESOLVENT_REPORT
+    trap 'rm -rf "$RESOLVENT_REPORT"' EXIT
+    cargo build --release
+    cargo test --release -p resolvent-tests --test physics
+    cargo test --release -p resolvent-tests --test cli skips
+fi
 cores=$(nproc)
 machine="$cores-core $(uname -m | tr _ -) $(grep -qw hypervisor /proc/cpuinfo && echo virtual machine || echo machine)"
 mkdir -p docs

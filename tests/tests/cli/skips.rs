@@ -123,15 +123,6 @@ fn what_is_absent_costs_nothing() {
             with: lonely,
             zero: &["/counts/flights", "/counts/lookups"],
         },
-        Row {
-            absent: "scattering (albedo 0, no emission)",
-            without: still(&at, "black", |s| {
-                s["media"]["smoke"]["params"]["albedo"] = json!(0);
-                s["shapes"] = json!([]);
-            }),
-            with: all.clone(),
-            zero: &["/counts/transmittances"],
-        },
     ];
     for row in rows {
         let (without, with) = (stats(&at, &row.without, &[]), stats(&at, &row.with, &[]));

@@ -30,18 +30,20 @@ fn conservative_thick_slab() {
     };
     let s = thick(1000.0);
     let p = Precision {
-        error: [f64::INFINITY, 3e-4, f64::INFINITY],
+        error: [f64::INFINITY, 6e-4, f64::INFINITY],
         limit: 1e6,
     };
-    let m = measure(&s, "slab of 1000", &p);
+    // Without a pilot: this is thirty million flights.
+    let m = once(&s, "slab of 1000");
     out.row("slab of 1000", &m, &[(1, 0.001_676_443_15)], &p);
-    out.near("R + T", m.mean[2], 1.0, 2e-5);
+    // Light of a picture is found by connections as well, so that this is noisy.
+    out.near("R + T", m.mean[2], 1.0, 5.0 * m.error[2] + 2e-5);
     if full() {
         let mut s = thick(1e5);
         s["film"]["resolution"] = json!([16, 16]);
         let ready = build(&s).unwrap_or_else(|e| panic!("{e}"));
         let m = ready.measure_range(1, 0, 4);
-        out.near("R + T of 1e5", m.mean[2], 1.0, 1e-3);
+        out.near("R + T of 1e5", m.mean[2], 1.0, 5.0 * m.error[2] + 1e-3);
         let each = m.counters.collisions as f64 / m.samples;
         out.claim(each > 1e3, || format!("{each} collisions a path"));
     }
