@@ -109,7 +109,7 @@ fn keys_and_names() {
     expect(
         "\"samples\", \"orders:4\"",
         "\"samples\", \"orders:4.5\"",
-        r#"full.json:12:63: $.film.aovs[5]: "orders:4.5" is no layer; orders are asked for as "orders:N", N from 0 to 99"#,
+        r#"full.json:12:66: $.film.aovs[5]: "orders:4.5" is no layer; orders are asked for as "orders:N", N from 0 to 99"#,
     );
     expect(
         "\"samples\", \"orders:4\"",

@@ -236,7 +236,8 @@ def test_open_pbr(tmp_path: Path) -> None:
         tmp_path,
         "color3f inputs:base_color = (0.5, 0.4, 0.3); float inputs:base_weight = 0.5; float inputs:transmission_weight = 1; color3f inputs:transmission_color = (0.9, 1, 0.9); "
         "float inputs:specular_ior = 1.33; bool inputs:geometry_thin_walled = 1; float inputs:emission_luminance = 10; float inputs:geometry_opacity = 0.5; "
-        "float inputs:base_diffuse_roughness = 0.3",
+        "float inputs:base_diffuse_roughness = 0.3; float inputs:coat_weight = 0.5; color3f inputs:coat_color = (1, 0.5, 0.5); "
+        "float inputs:base_metalness = 0.5; color3f inputs:specular_color = (0.5, 0.75, 1); color3f inputs:thin_film_weight = (1, 1, 1)",
         kind="ND_open_pbr_surface_surfaceshader",
     )
     assert material["plugin"] == "mask" and material["params"]["opacity"] == 0.5
@@ -244,7 +245,9 @@ def test_open_pbr(tmp_path: Path) -> None:
     assert params["base_color"] == pytest.approx([0.25, 0.2, 0.15]) and params["thin"] is True and params["transmission"] == 1
     assert params["transmission_color"] == pytest.approx([0.9, 1, 0.9]) and params["ior"] == pytest.approx(1.33)
     assert converted.scene["shapes"][0]["emission"] == [10, 10, 10]
-    assert any("base_diffuse_roughness" in x for x in converted.losses("/m/s"))
+    assert params["diffuse_roughness"] == pytest.approx(0.3) and params["clearcoat_color"] == [1, 0.5, 0.5] and params["clearcoat_darkening"] == 1
+    assert params["edge_color"] == params["specular_color"] == [0.5, 0.75, 1] and params["clearcoat_ior"] == pytest.approx(1.6)
+    assert any("thin_film_weight" in x for x in converted.losses("/m/s"))
 
 
 def mats(*names: str) -> str:

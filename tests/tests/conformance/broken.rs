@@ -16,7 +16,7 @@ fn caught(kind: &str, mistakes: &[(&str, &str)]) {
     );
     for (mistake, property) in mistakes {
         let path = library(kind, Some(mistake)).display().to_string();
-        let report = check(&path, &["--isolate", "--patience", "20"]);
+        let report = check(&path, &["--isolate", "--patience", "300"]);
         let broken = report.broken();
         assert!(
             report.code == Some(1) && broken.contains(property),

@@ -11,7 +11,7 @@ fn unit() -> impl Strategy<Value = f32> {
         8 => 0f32..1.0,
         1 => Just(0.0f32),
         1 => Just(1.0f32 - f32::EPSILON / 2.0),
-        1 => (1e-30f32..1e-3),
+        1 => 1e-30f32..1e-3,
         1 => (1e-7f32..1e-3).prop_map(|x| 1.0 - x),
     ]
 }

@@ -50,10 +50,13 @@ struct Sheet {
 /// Sheets by width and ratio.
 type Sheets = [[OnceLock<Box<Sheet>>; RATIO_NODES]; ALPHA_NODES];
 
-const NO_SHEETS: Sheets = [const { [const { OnceLock::new() }; RATIO_NODES] }; ALPHA_NODES];
-static MIRRORS: Sheets = NO_SHEETS;
+const fn no_sheets() -> Sheets {
+    [const { [const { OnceLock::new() }; RATIO_NODES] }; ALPHA_NODES]
+}
+
+static MIRRORS: Sheets = no_sheets();
 /// By side, from the optically thinner one and from the denser, and by index.
-static DIELECTRICS: [[Sheets; ETA_NODES]; 2] = [const { [NO_SHEETS; ETA_NODES] }; 2];
+static DIELECTRICS: [[Sheets; ETA_NODES]; 2] = [const { [const { no_sheets() }; ETA_NODES] }; 2];
 
 /// Where a direction lies in every sheet: nodes and the ways to the next.
 #[derive(Clone, Copy)]

@@ -174,7 +174,7 @@ impl Film {
             for r in t.coverage().ranges() {
                 let ends = [r.start, r.end - 1].map(nets::around);
                 for net in ends {
-                    if t.coverage().missing(net.clone()) != [] {
+                    if !t.coverage().missing(net.clone()).is_empty() {
                         wanted.insert((i, net.start));
                     }
                 }

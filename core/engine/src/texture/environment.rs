@@ -156,7 +156,6 @@ mod tests {
             (Mapping::VerticalCross, 192, 256),
         ] {
             let mut values = vec![0f32; width * height];
-            let mut filled = vec![false; width * height];
             // Drawn by scattering many directions onto the image.
             let n = 4_000_000;
             for i in 0..n {
@@ -168,7 +167,6 @@ mod tests {
                 let x = ((u * width as f64) as usize).min(width - 1);
                 let y = ((v * height as f64) as usize).min(height - 1);
                 values[y * width + x] = (0..3).map(|k| w[k] * axis[k]).sum::<f64>() as f32 + 2.0;
-                filled[y * width + x] = true;
             }
             let mut image = resolvent_image::Image::new(width, height);
             let planes = ["R", "G", "B"].map(|c| (c, values.clone()));

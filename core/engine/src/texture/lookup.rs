@@ -217,9 +217,11 @@ impl Texture {
 fn tile(tiles: &[Option<Texture>], [x, y]: [f32; 2]) -> [f32; 4] {
     let (column, row) = (x.floor(), y.floor());
     let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
-    let index = row as usize * COLUMNS + column as usize;
-    match tiles.get(index) {
-        Some(Some(tile)) if lies => tile.at([x - column, y - row], &WHITE),
+    if !lies {
+        return [0.0; 4];
+    }
+    match tiles.get(row as usize * COLUMNS + column as usize) {
+        Some(Some(tile)) => tile.at([x - column, y - row], &WHITE),
         _ => [0.0; 4],
     }
 }

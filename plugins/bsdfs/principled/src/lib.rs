@@ -98,6 +98,15 @@ pub struct Parameters {
     sheen_roughness: f32,
 }
 
+/// A material that is the same everywhere.
+#[derive(Debug)]
+struct Constant {
+    parameters: Parameters,
+    /// Its layers in vacuum, as most vertices need them.
+    surface: Surface,
+    lanes: u32,
+}
+
 /// The plugin.
 #[derive(Debug)]
 pub struct Principled {
@@ -122,8 +131,8 @@ pub struct Principled {
     sheen: TexturedFloat,
     sheen_color: TexturedSpectrum,
     sheen_roughness: TexturedFloat,
-    /// The parameters, if they are the same everywhere.
-    constant: Option<Parameters>,
+    /// What is the same everywhere, if all parameters are.
+    constant: Option<Constant>,
 }
 
 const fn share(name: &'static str, default: &'static str, help: &'static str) -> ParamDecl {
@@ -259,7 +268,13 @@ impl Plugin for Principled {
             constant: None,
         };
         if all.is_constant() {
-            all.constant = Some(all.resolve(&SurfacePoint::default()));
+            let parameters = all.resolve(&SurfacePoint::default());
+            let lanes = params.lanes();
+            all.constant = Some(Constant {
+                parameters,
+                surface: Surface::new(&parameters, 1.0, lanes),
+                lanes,
+            });
         }
         Ok(all)
     }
@@ -341,7 +356,8 @@ impl Bsdf for Principled {
 
     fn closure(&self, at: &SurfacePoint) -> Surface {
         match &self.constant {
-            Some(parameters) => Surface::new(parameters, at.outside_ior, at.lanes),
+            Some(c) if at.outside_ior == 1.0 && at.lanes == c.lanes => c.surface,
+            Some(c) => Surface::new(&c.parameters, at.outside_ior, at.lanes),
             None => Surface::new(&self.resolve(at), at.outside_ior, at.lanes),
         }
     }

@@ -197,9 +197,11 @@ def _preview_opacity(s: _Surface) -> None:
 def _standard_surface(s: _Surface) -> Look:
     """Autodesk Standard Surface 1.0.1."""
     s.set("base_color", s.product("base", "base_color", 1.0, 0.8), number=False)
-    s.set("metallic", s.read("metalness", 0.0), 0.0)
-    s.set("specular", s.read("specular", 1.0), 1.0)
-    s.set("specular_color", s.read("specular_color", 1.0), 1.0, 0.0, 1e3, number=False)
+    _reflection(s, "metalness", "specular")
+    roughness = s.read("diffuse_roughness", 0.0)
+    s.set("diffuse_roughness", roughness, 0.0)
+    if not roughness.is_just(0.0):
+        s.node.claim.approximated("inputs:diffuse_roughness", "principled has OpenPBR's rough diffuse", "not Oren and Nayar's")
     s.set("roughness", s.read("specular_roughness", 0.2), 0.5)
     s.set("ior", _constant(s, "specular_IOR", 1.5), 1.5, 1.0, 5.0)
     s.set("anisotropy", s.read("specular_anisotropy", 0.0), 0.0)
@@ -228,15 +230,15 @@ def _standard_surface(s: _Surface) -> Look:
     if not coat.is_just(0.0):
         s.set("clearcoat_roughness", s.read("coat_roughness", 0.1), 0.0)
         s.set("clearcoat_ior", _constant(s, "coat_IOR", 1.5), 1.5, 1.0, 3.0)
+        s.set("clearcoat_color", s.read("coat_color", 1.0), 1.0, number=False)
         s.without(
-            {"coat_color": 1.0, "coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0, "coat_normal": _NORMAL_UP},
-            "the coat is colourless and even",
+            {"coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0, "coat_normal": _NORMAL_UP},
+            "the coat is even",
         )
         s.ignore("coat_rotation")
     else:
         s.ignore("coat_color", "coat_roughness", "coat_IOR", "coat_anisotropy", "coat_rotation", "coat_normal")
         s.ignore("coat_affect_color", "coat_affect_roughness")
-    s.without({"diffuse_roughness": 0.0}, "the diffuse part is Lambert's")
     s.without({"thin_film_thickness": 0.0}, "the surface does not iridesce")
     s.without({"specular_rotation": 0.0, "tangent": (1.0, 0.0, 0.0)}, "highlights stretch across x")
     s.ignore("thin_film_IOR")
@@ -251,9 +253,8 @@ def _standard_surface(s: _Surface) -> Look:
 def _open_pbr(s: _Surface) -> Look:
     """OpenPBR Surface 1.1."""
     s.set("base_color", s.product("base_weight", "base_color", 1.0, 0.8), number=False)
-    s.set("metallic", s.read("base_metalness", 0.0), 0.0)
-    s.set("specular", s.read("specular_weight", 1.0), 1.0)
-    s.set("specular_color", s.read("specular_color", 1.0), 1.0, 0.0, 1e3, number=False)
+    _reflection(s, "base_metalness", "specular_weight")
+    s.set("diffuse_roughness", s.read("base_diffuse_roughness", 0.0), 0.0)
     s.set("roughness", s.read("specular_roughness", 0.3), 0.5)
     s.set("ior", _constant(s, "specular_ior", 1.5), 1.5, 1.0, 5.0)
     s.set("anisotropy", s.read("specular_roughness_anisotropy", 0.0), 0.0)
@@ -280,11 +281,11 @@ def _open_pbr(s: _Surface) -> Look:
     if not coat.is_just(0.0):
         s.set("clearcoat_roughness", s.read("coat_roughness", 0.0), 0.0)
         s.set("clearcoat_ior", _constant(s, "coat_ior", 1.6), 1.5, 1.0, 3.0)
-        s.without({"coat_color": 1.0, "coat_roughness_anisotropy": 0.0, "geometry_coat_normal": _NORMAL_UP}, "the coat is colourless and even")
-        s.ignore("coat_darkening")
+        s.set("clearcoat_color", s.read("coat_color", 1.0), 1.0, number=False)
+        s.set("clearcoat_darkening", s.read("coat_darkening", 1.0), 0.0)
+        s.without({"coat_roughness_anisotropy": 0.0, "geometry_coat_normal": _NORMAL_UP}, "the coat is even")
     else:
         s.ignore("coat_color", "coat_roughness", "coat_ior", "coat_roughness_anisotropy", "coat_darkening", "geometry_coat_normal")
-    s.without({"base_diffuse_roughness": 0.0}, "the diffuse part is Lambert's")
     s.without({"thin_film_weight": 0.0}, "the surface does not iridesce")
     s.without({"geometry_tangent": (1.0, 0.0, 0.0), "geometry_coat_tangent": (1.0, 0.0, 0.0)}, "highlights stretch across x")
     s.ignore("thin_film_thickness", "thin_film_ior")
@@ -295,6 +296,16 @@ def _open_pbr(s: _Surface) -> Look:
     s.emission = s.product("emission_luminance", "emission_color", 0.0, 1.0)
     s.read_normal("geometry_normal")
     return s.look()
+
+
+def _reflection(s: _Surface, metalness: str, weight: str) -> None:
+    """Dielectric and metal; the metal's edge, at 82°, has the specular colour."""
+    metal, color = s.read(metalness, 0.0), s.read("specular_color", 1.0)
+    s.set("metallic", metal, 0.0)
+    s.set("specular", s.read(weight, 1.0), 1.0)
+    s.set("specular_color", color, 1.0, 0.0, 1e3, number=False)
+    if not metal.is_just(0.0):
+        s.set("edge_color", color, 1.0, number=False)
 
 
 def _constant(s: _Surface, name: str, default: float) -> Value:
