@@ -111,7 +111,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         integrator: integrator.title(),
     };
     image.metadata = stats::metadata(&about, &described, &rendered, &certainty);
-    output::write(&a.tone, &image, &targets)?;
+    output::write(&a.tone, &image, targets)?;
     seconds.write = write_start.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
     if let Some(file) = &a.stats {
@@ -129,7 +129,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     }
     let summary = format!(
         "{} ({})",
-        output::names(&targets, a.aim.checkpoint.as_deref()),
+        output::names(targets, a.aim.checkpoint.as_deref()),
         certainty.summary(&rendered)
     );
     if let Some(Failure { code, message }) = broken {

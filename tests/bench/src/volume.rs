@@ -30,6 +30,9 @@ pub struct Ball {
     waves: Vec<f32>,
 }
 
+/// Origin and mask of active voxels.
+type Place = ([i32; 3], [u8; 64]);
+
 impl Ball {
     /// A ball of about this many voxels.
     pub fn new(voxels: f64) -> Self {
@@ -137,7 +140,7 @@ impl Voxels<'_> {
 
     /// The tree without its values, and origin and mask of every leaf in the file's order: upper nodes, in them lower nodes, in
     /// them leaves.
-    fn topology(&self) -> (Vec<u8>, Vec<([i32; 3], [u8; 64])>) {
+    fn topology(&self) -> (Vec<u8>, Vec<Place>) {
         let (mut bytes, mut leaves) = (Vec::new(), Vec::new());
         let uppers = self.nodes(UPPER, None);
         bytes.extend((uppers.len() as u32).to_le_bytes());

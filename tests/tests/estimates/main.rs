@@ -95,8 +95,8 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     for (i, mean) in pixel_means.iter_mut().enumerate() {
         for r in &all {
             let e = r.film.estimate(i);
-            for k in 0..3 {
-                mean[k] += e.mean[k] / n;
+            for (sum, v) in mean.iter_mut().zip(e.mean) {
+                *sum += v / n;
             }
         }
     }

@@ -114,13 +114,12 @@ fn truncated_sums_are_the_first_layers() {
             }
             let c = bdpt.render(100 + seed, 0, SPP).film;
             let (a, c) = (means(&a, first), means(&c, |f, i| f.estimate(i).mean));
-            for lane in 0..3 {
-                lanes[0][lane].add(a[lane]);
-                lanes[1][lane].add(c[lane]);
+            for (of, means) in lanes.iter_mut().zip([a, c]) {
+                of.iter_mut().zip(means).for_each(|(m, v)| m.add(v));
             }
         }
-        for lane in 0..3 {
-            let [a, b] = [&lanes[0][lane], &lanes[1][lane]];
+        let [layers, pictures] = &lanes;
+        for (lane, (a, b)) in layers.iter().zip(pictures).enumerate() {
             let what = format!("up to order {n}, lane {lane}");
             println!(
                 "{what}: layers {:.6} +- {:.6}, bdpt {:.6} +- {:.6}",

@@ -89,9 +89,10 @@ fn nothing_breaks_drifts_or_grows() {
             // Far along each pixel's sequence as well as with new seeds.
             let begin = if k % 2 == 0 { 0 } else { SPP * k };
             let m = scene.measure_range(1000 + u64::from(k), begin, begin + SPP);
-            for lane in 0..3 {
-                of[half][lane].add(m.mean[lane]);
-            }
+            of[half]
+                .iter_mut()
+                .zip(m.mean)
+                .for_each(|(of, v)| of.add(v));
         }
         // The first rounds fill pools and tables.
         if k == rounds / 4 {
@@ -101,8 +102,8 @@ fn nothing_breaks_drifts_or_grows() {
     let grown = memory() - after_first;
     assert!(grown < 8e6, "memory grew by {grown:.1e} bytes");
     for ((name, _), of) in ready.iter().zip(&halves) {
-        for lane in 0..3 {
-            let [a, b] = [&of[0][lane], &of[1][lane]];
+        let [first, second] = of;
+        for (lane, (a, b)) in first.iter().zip(second).enumerate() {
             let error = a.standard_error().hypot(b.standard_error());
             let z = (a.mean() - b.mean()) / error;
             println!(

@@ -77,10 +77,11 @@ impl Film {
         floor((0..self.pixels.len()).map(|i| self.half_estimate(i)))
     }
 
-    /// Square of the relative error of a tile by this half alone; `None` before it has two nets.
+    /// Square of the relative error of a tile by this half alone, and one standard error of that square more: the first estimate
+    /// below a goal is one of those that are too low. `None` before the half has two nets.
     pub(crate) fn half_error(&self, tile: usize, floor: f64) -> Option<f64> {
         let pixels = tile::rect(self.window, tile).indices(self.window);
-        Square::of(pixels.map(|i| self.half_estimate(i)), floor).map(|x| x.mean())
+        Square::of(pixels.map(|i| self.half_estimate(i)), floor).map(|x| x.mean() + x.error())
     }
 
     /// The picture's mean and its interval, by the spread of the tiles' nets: walks of one tile that light many pixels, or share
@@ -165,6 +166,12 @@ impl Square {
 
     fn mean(&self) -> f64 {
         self.sum / self.count
+    }
+
+    /// Standard error of the mean, by the spread over pixels.
+    fn error(&self) -> f64 {
+        let spread = self.squares / self.count - self.mean() * self.mean();
+        (spread.max(0.0) / self.count).sqrt()
     }
 }
 

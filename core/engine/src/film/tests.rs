@@ -14,7 +14,7 @@ fn sample(v: f32) -> PixelSample {
         radiance: Spectrum::rgb(v, 2.0 * v, -v),
         alpha: 1.0,
         depth: 1.0 + v.abs(),
-        albedo: [v.abs(), 0.5, 0.0].into(),
+        albedo: [v.abs(), 0.5, 0.0],
         ..Default::default()
     }
 }

@@ -216,7 +216,7 @@ impl Texture {
 /// The value on the tile that lies under (x, y), nothing where there is none.
 fn tile(tiles: &[Option<Texture>], [x, y]: [f32; 2]) -> [f32; 4] {
     let (column, row) = (x.floor(), y.floor());
-    let lies = column >= 0.0 && column < COLUMNS as f32 && row >= 0.0 && row < 1000.0;
+    let lies = (0.0..COLUMNS as f32).contains(&column) && (0.0..1000.0).contains(&row);
     if !lies {
         return [0.0; 4];
     }
