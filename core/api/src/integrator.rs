@@ -112,6 +112,9 @@ impl<'a> SceneView<'a> {
     }
 
     /// Chooses a point on a light for `reference`; `None` if nothing can be connected.
+    ///
+    /// Lights that scattering finds as well from there are left to it (a constant environment, from inside a medium): then
+    /// [`SceneView::light_density`] is 0, and only an integrator that also follows scattered directions has all light.
     #[inline(always)]
     pub fn sample_light(
         &self,

@@ -114,7 +114,7 @@ fn keys_and_names() {
     expect(
         "\"samples\", \"orders:4\"",
         "\"orders:3\", \"orders:4\"",
-        r#"full.json:12:64: $.film.aovs[5]: "orders:4" is named twice"#,
+        r#"full.json:12:67: $.film.aovs[5]: "orders:4" is named twice"#,
     );
     expect(
         "\"interior\": \"fog\"},\n    {\"type\": \"rectangle\"",

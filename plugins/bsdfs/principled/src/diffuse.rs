@@ -72,7 +72,7 @@ impl Diffuse {
         let (o, i) = (wo.z.abs().min(1.0), wi.z.abs().min(1.0));
         // Oren & Nayar's term in the form of Fujii (2013) for what is scattered once.
         let s = wo.x * wi.x + wo.y * wi.y;
-        let s = if s > 0.0 { s / o.max(i) } else { s };
+        let s = if s > 0.0 { s / o.max(i).max(1e-6) } else { s };
         let once = self.a * (1.0 + self.roughness * s);
         let lost = (1.0 - self.once(o)) * (1.0 - self.once(i));
         let under = self.under.at(o) * self.under.at(i);

@@ -3,8 +3,9 @@
 //!
 //! Per sample: one flight from the camera, and one connection from the vertex it ends at to a point on a light, weighed by
 //! the balance heuristic over the lanes (Wilkie et al. 2014; over null-collision paths Miller et al. 2019, eq. 15), so chromatic
-//! media are exact. The picture is that of `pt` with `max_depth` 1, but for surfaces that scatter by delta lobes alone,
-//! which no connection finds.
+//! media are exact. The picture is that of `pt` with `max_depth` 1, but for what no connection finds: surfaces that scatter by
+//! delta lobes alone, and the light of a constant environment in media, which the host leaves to scattering
+//! ([`SceneView::sample_light`]).
 
 use resolvent_api::abi::{PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::{Outcome, SceneView};
