@@ -290,7 +290,7 @@ fn frames() {
         ..mesh.clone()
     };
     assert_eq!(at.color, [1.0; 4]);
-    assert!(!accel.uv_mirrored(0, 0));
+    assert!(accel.uv_mirrored(0, 0));
     let painted = one(Shape::Mesh(TriangleMesh {
         colors: vec![
             [1.0, 0.0, 0.0, 1.0],

@@ -204,7 +204,8 @@ mod tests {
         assert!(floor.abs() < 4.0 * s.floor_error, "{s:?}");
         assert!(s.mean_off.abs() < 4.0 * s.mean_off_error, "{s:?}");
         assert!((s.rel_mse / (0.04 / 1.01) - 1.0).abs() < 0.05, "{s:?}");
-        assert!((s.noise.unwrap() - 0.04 / 1.01).abs() < 1e-6);
+        // The reference's own noise moves the mean of 1/(r² + 0.01) by a few of its variances.
+        assert!((s.noise.unwrap() - 0.04 / 1.01).abs() < 1e-5);
     }
 
     #[test]

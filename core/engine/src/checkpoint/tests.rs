@@ -161,10 +161,10 @@ fn what_is_foreign_is_told_apart() {
     // Sums that this program does not know would be lost.
     let mut out = sections::Writer::new(b"{\"window\": [0, 0, 1, 1], \"halves\": 1}");
     Film::new([0, 0, 1, 1], false).write("", &mut out);
-    out.section("orders", |out| out.push(1));
+    out.section("depths", |out| out.push(1));
     let text = why(&out.finish());
     assert!(
-        text.contains("'orders'") && text.contains("use the program"),
+        text.contains("'depths'") && text.contains("use the program"),
         "{text}"
     );
 }
