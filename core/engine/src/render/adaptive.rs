@@ -388,7 +388,6 @@ mod tests {
                 assert_eq!(film.estimate(i), again.estimate(i));
             }
         }
-        // What is stated in the end is not chosen by the decision, and may be a little above.
         assert!(squares.sqrt() < 0.3, "{}", squares.sqrt());
         assert!(most > 500, "{most}");
     }

@@ -415,6 +415,8 @@ impl Scatter for Surface {
         if wi.z == 0.0 {
             return None;
         }
+        // A cosine that rounding carried beyond 1 has no sine.
+        let wi = Vec3::new(wi.x, wi.y, wi.z.clamp(-1.0, 1.0));
         let e = self.evaluate(wo, wi, &po, &self.passage(wi));
         (e.forward > 0.0).then(|| ScatterSample {
             weight: e.f * (wi.z.abs() / e.forward),
