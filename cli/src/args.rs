@@ -63,6 +63,7 @@ Examples:
   resolvent render scene.json -o tile.exr --crop 0,0,320,180
   resolvent render scene.json -o out.exr --spp 4096 --checkpoint out.ckpt --resume    (again after a crash)
   resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt    (resolvent merge a.ckpt b.ckpt -o out.exr)
+  resolvent render scene.json -o out.png --spp 16 --watch    (again after every change, until Ctrl-C)
 
 Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once.";
 
@@ -140,6 +141,13 @@ pub struct Render {
     /// Write the scene as it is rendered, options and guesses included
     #[arg(long, value_name = "FILE.json")]
     pub save_scene: Option<PathBuf>,
+    /// Render again whenever the input, a file that it names or a plugin in use changes; a change ends the render in progress. Errors are
+    /// shown, and leave the last picture as it is. Ctrl-C ends it
+    #[arg(long, conflicts_with_all = ["checkpoint", "save_scene"])]
+    pub watch: bool,
+    /// One render of --watch: for the process that it starts
+    #[arg(long, hide = true)]
+    pub watched: bool,
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,

@@ -62,6 +62,7 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let entry = cache::Entry::new(stage, &arguments, python.version())?;
     if let Some((scene, losses)) = entry.find() {
         say(&losses);
+        crate::watch::reads(entry.layers());
         return Ok(scene);
     }
     let folder = entry.begin()?;
@@ -73,6 +74,7 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
         .map_err(|e| python.broken(&e))?;
     let said = String::from_utf8_lossy(&out.stderr);
     if !out.status.success() {
+        crate::watch::reads(cache::layers(folder));
         entry.discard();
         // The converter's own words; its last line is the error.
         let (losses, error) = said.trim_end().rsplit_once('\n').unwrap_or(("", &said));
@@ -87,7 +89,9 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
         });
     }
     say(&said);
-    entry.keep(&said)
+    let scene = entry.keep(&said)?;
+    crate::watch::reads(entry.layers());
+    Ok(scene)
 }
 
 /// What the converter said, each loss a warning: the picture is not quite what the stage means.
