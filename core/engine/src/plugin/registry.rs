@@ -73,8 +73,8 @@ impl Registry {
         }
     }
 
-    /// Adds a plugin that is linked into the program, by the header that its library would export: it comes before all in the search
-    /// path.
+    /// Adds a plugin that is linked into the program, by the header that its library would export (with the feature `linked` of
+    /// `resolvent-api`, so that there can be several): it comes before all in the search path.
     ///
     /// # Errors
     /// As for one that is loaded.
