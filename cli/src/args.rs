@@ -532,14 +532,26 @@ pub enum Language {
     C,
 }
 
+const CHECK_HELP: &str = "\
+Example:
+  resolvent plugin check target/release/libmine.so --isolate
+
+Data races of a plugin in C or C++, found although the answers are right:
+  cc -g -O1 -fsanitize=thread -shared -fPIC mine.c -o mine.so -lm
+  LD_PRELOAD=libtsan.so.2 resolvent plugin check ./mine.so --brief";
+
 /// Options of `plugin check`.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = CHECK_HELP)]
 pub struct Check {
     /// A plugin's name, or the path of its library
     pub plugin: String,
     /// Parameters to check it with, as JSON; those that are not given are varied over their ranges
     #[arg(long, value_name = "JSON")]
     pub params: Option<String>,
+    /// Only what needs no statistics: declarations, determinism, threads, memory
+    #[arg(long)]
+    pub brief: bool,
     /// Check in a process of its own, so that a crash or a hang is reported like any other fault
     #[arg(long)]
     pub isolate: bool,

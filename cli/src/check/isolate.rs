@@ -42,6 +42,9 @@ pub fn parent(a: &Check) -> Outcome<Report> {
     if let Some(params) = &a.params {
         command.args(["--params", params]);
     }
+    if a.brief {
+        command.arg("--brief");
+    }
     for folder in &a.plugins.plugin_path {
         command.arg("--plugin-path").arg(folder);
     }
