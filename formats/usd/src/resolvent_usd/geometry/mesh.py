@@ -14,7 +14,7 @@ from ..context import Context, Look
 from ..registry import converts
 from ..report import InputError
 from . import primvars
-from .glb import compact, write
+from .glb import write
 from .looks import look_of
 from .primvars import Primvar, Topology
 from .refine import Surface, refine
@@ -160,7 +160,7 @@ def emit(ctx: Context, claim: Claim, surface: Surface, look: Look, faces: Ints |
     if len(triangles.indices) == 0:
         return
     stem = "".join(c if c.isalnum() else "_" for c in claim.prim.GetName())[:40]
-    file = ctx.files.add(stem, ".glb", write(compact(triangles)))
+    file = ctx.files.add(stem, ".glb", write(triangles))
     claim.group.add({"type": "gltf", "file": file, **look.shape}, claim.matrix)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,8 @@ def triangulate(points: NDArray[Any], counts: Ints, indices: Ints) -> tuple[Ints
         ring = np.arange(len(indices)).reshape(-1, n)
         if n == 3:
             return ring, np.arange(len(counts))
-        cut = ring[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 2, 3)
-        folded = _folded(points[indices].reshape(-1, 4, 3))
+        cut = (ring[:, :1] + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 2, 3)
+        folded = np.flatnonzero(np.concatenate([_folded(points.take(part, axis=0)) for part in _parts(indices.reshape(-1, 4))]))
         cut[folded] = ring[folded][:, [0, 1, 3, 1, 2, 3]].reshape(-1, 2, 3)
         return cut.reshape(-1, 3), np.repeat(np.arange(len(counts)), 2)
     starts = np.cumsum(counts) - counts
@@ -48,6 +49,12 @@ def triangulate(points: NDArray[Any], counts: Ints, indices: Ints) -> tuple[Ints
     face = np.concatenate(faces)
     order = np.argsort(face, kind="stable")
     return np.concatenate(corners)[order], face[order]
+
+
+def _parts(faces: Ints) -> Iterator[Ints]:
+    """Some faces at a time: so many that what is computed for them stays in the cache."""
+    for start in range(0, len(faces), 1 << 14):
+        yield faces[start : start + (1 << 14)]
 
 
 def _quads(p: Floats) -> Ints:
