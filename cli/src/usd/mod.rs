@@ -16,7 +16,7 @@ use std::process::{Command, Stdio};
 pub fn convert(a: &Convert) -> Outcome {
     let python = Python::find()?;
     let mut command = command(&python, &a.stage, &a.output, &a.options);
-    if let Some(frames) = &a.frames {
+    if let Some(frames) = &a.options.frames {
         command.arg(format!("--frames={frames}"));
     }
     report(&mut command, &a.report);

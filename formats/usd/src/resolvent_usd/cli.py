@@ -81,7 +81,7 @@ def scene_files(output: Path, frames: Sequence[float | None]) -> list[Path]:
         pattern = f"{output.stem}.####{output.suffix}"
 
     def name(frame: float) -> str:
-        whole, _, part = f"{frame:g}".partition(".")
+        whole, _, part = f"{round(frame, 6):.12g}".partition(".")
         number = lambda m: whole.zfill(len(m[0])) + ("." + part if part else "")  # noqa: E731
         return re.sub("#+", number, pattern, count=1)
 
