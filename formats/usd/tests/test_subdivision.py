@@ -219,3 +219,10 @@ def test_corners_of_a_point_with_equal_values_are_one(kinds: int) -> None:
         places.setdefault(key, corner)
         assert first[which[corner]] == places[key]
     assert sorted(places.values()) == first.tolist()
+
+
+def test_loop_subdivision_is_reported(convert_text) -> None:
+    triangles = MESH.replace("[4, 4, 4, 4]", "[3, 3]").replace("[0, 1, 4, 3, 1, 2, 5, 4, 3, 4, 7, 6, 4, 5, 8, 7]", "[0, 1, 4, 0, 4, 3]")
+    found = convert_text(triangles % 'uniform token subdivisionScheme = "loop"')
+    (loss,) = [x for x in found.report.losses if x.path == "/m"]
+    assert (loss.kind, loss.what) == ("approximated", "subdivisionScheme") and "Loop" in loss.reason
