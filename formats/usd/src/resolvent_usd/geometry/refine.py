@@ -94,6 +94,8 @@ def _welded(
         shared = _shared(apart, indices, first)
         if shared is not None:
             source, vertex = shared
+            if len(source) == len(indices):
+                return compact(Triangles(points.take(indices, axis=0), corners, *map(_whole, attributes)))
             place = points.take(indices.take(source), axis=0)
             return compact(Triangles(place, vertex.take(corners), *(_taken(a, source) for a in attributes)))
 
@@ -109,6 +111,13 @@ def _welded(
 def _taken(a: tuple[Array, Ints] | None, corners: Ints) -> Array | None:
     """The values at some corners."""
     return None if a is None else a[0].take(a[1].take(corners), axis=0)
+
+
+def _whole(a: tuple[Array, Ints] | None) -> Array | None:
+    """The values at all corners."""
+    if a is None or _one_each(a[1]):
+        return None if a is None else a[0]
+    return a[0].take(a[1], axis=0)
 
 
 def _first_corners(indices: Ints, size: int) -> Ints:
