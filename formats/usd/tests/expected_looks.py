@@ -57,6 +57,12 @@ class Reader:
             raise Unknown(str(shader.GetPath()))
         return self.preview(shader)
 
+    @staticmethod
+    def plain(grey: float) -> Look:
+        """UsdPreviewSurface with this diffuseColor and nothing else."""
+        plain = {k: three(v) for k, v in PRINCIPLED.items()}
+        return {"plugin": "principled", **plain, "base_color": three(grey), "emission": three(0.0)}
+
     def preview(self, shader: UsdShade.Shader) -> Look:
         """By the specification of UsdPreviewSurface, and what CONVENTIONS.md says of opacity."""
 

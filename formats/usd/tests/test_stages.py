@@ -78,6 +78,10 @@ def seen(converted: Converted) -> list[tuple[np.ndarray, Look, dict[str, np.ndar
     return out
 
 
+# usd-core can't open this MaterialX document; by the stage's own comment "the entire ball will be 50% gray".
+MATERIALX = {"/World/Ball/BallGeom/BallPenta": 0.5}
+
+
 def assert_looks(found: Converted, stage: Usd.Stage) -> int:
     """Every part of the stage is in the scene, once, with the look that is bound to it; the number of parts compared."""
     expected, shapes = Expected(stage, found.file.parent), seen(found)
@@ -94,6 +98,8 @@ def assert_looks(found: Converted, stage: Usd.Stage) -> int:
         except Unknown as unknown:
             assert any(x.path == str(unknown) and x.kind == "skipped" for x in found.report.losses), where
             look = reader.display()
+        if (grey := MATERIALX.get(where)) is not None:
+            look = Reader.plain(grey)
         place = box(part.points)
         near = 1e-6 * max(1.0, np.abs(place).max())
         there = [i for i, (b, _, _) in enumerate(shapes) if np.abs(b - place).max() <= near]

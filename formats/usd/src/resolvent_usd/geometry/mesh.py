@@ -39,6 +39,7 @@ def mesh(ctx: Context, claim: Claim) -> None:
     """Converts a mesh: one glTF shape for each material."""
     no_motion(claim)
     claim.take("doubleSided")  # A hint: surfaces are seen from both sides.
+    claim.take_prefix("subsetFamily:")  # Says how subsets are meant to be disjoint; those that are not are reported.
     topology = _topology(claim)
     points = claim.array("points", np.float32, 3)
     if points is None or not len(topology.counts):
