@@ -59,7 +59,7 @@ fn finish(mut command: Command, python: &Python, what: &Path) -> Outcome {
 pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let python = Python::find()?;
     let arguments = arguments(options);
-    let entry = cache::Entry::new(stage, &arguments, python.version())?;
+    let entry = cache::Entry::new(stage, &arguments, python.fingerprint())?;
     if let Some((scene, losses)) = entry.find() {
         say(&losses);
         return Ok(scene);

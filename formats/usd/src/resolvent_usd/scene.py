@@ -144,7 +144,7 @@ def npy(array: Matrix) -> Sequence[bytes | memoryview]:
     """The bytes of a NumPy file of little-endian f32, C order."""
     data, header = np.ascontiguousarray(array, dtype="<f4"), io.BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(data))
-    return [header.getvalue(), memoryview(data).cast("B")]
+    return [header.getvalue(), data.reshape(-1).view(np.uint8).data]
 
 
 def _short_lists(text: str) -> str:

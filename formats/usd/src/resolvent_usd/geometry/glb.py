@@ -67,7 +67,7 @@ def write(t: Triangles) -> list[Content]:
         if bounds:
             accessor["min"], accessor["max"] = (_along_rows(f, data).tolist() for f in (np.minimum, np.maximum))
         accessors.append(accessor)
-        chunks.append(memoryview(data).cast("B"))
+        chunks.append(data.reshape(-1).view(np.uint8).data)
         return len(accessors) - 1
 
     attributes = {"POSITION": add(t.positions, "VEC3", _F32, _ARRAY_BUFFER, bounds=True)}

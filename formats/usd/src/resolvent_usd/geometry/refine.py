@@ -165,7 +165,7 @@ def _one_each(which: Ints) -> bool:
 
 def _differ(values: Array, a: Ints, b: Ints) -> NDArray[np.bool_]:
     """True where rows a and b of the values differ."""
-    out = a != b
+    out: NDArray[np.bool_] = a != b
     at = np.flatnonzero(out)
     other = values.take(a.take(at), axis=0) != values.take(b.take(at), axis=0)
     out[at] = other[:, 0] if other.shape[1] == 1 else np.logical_or.reduce(list(other.T))

@@ -231,13 +231,13 @@ def _vertex_points(cage: Cage, p: Floats, face_values: Floats) -> Floats:
     degree = np.bincount(a, minlength=size) + np.bincount(b, minlength=size)
     n = np.maximum(degree, 1).astype(float)
     neighbours = _sum_at(a, p[:, b], size) + _sum_at(b, p[:, a], size)
-    smooth = p * ((n - 2.0) / n) + (neighbours + _sum_at(cage.indices, face_values, size)) / (n * n)
+    smooth: Floats = p * ((n - 2.0) / n) + (neighbours + _sum_at(cage.indices, face_values, size)) / (n * n)
 
     def under(rules: _Rules) -> Floats:
         if not rules.special:
             return smooth
         crease = 0.75 * p + 0.125 * _around_sharp(edges, rules.sharp, p)
-        return np.where(rules.corner, p, np.where(rules.crease, crease, smooth))
+        return np.asarray(np.where(rules.corner, p, np.where(rules.crease, crease, smooth)))
 
     now = _Rules.of(edges, edges.sharpness, cage.corner_sharpness)
     moved = under(now)
@@ -259,7 +259,7 @@ def _vertex_points(cage: Cage, p: Floats, face_values: Floats) -> Floats:
             w = np.minimum(weight / np.maximum(count, 1), 1.0)
             moved = np.where(changes & (count > 0), w * moved + (1.0 - w) * under(then), moved)
     # What no face uses stays where it is.
-    return np.where(degree > 0, moved, p) if (degree == 0).any() else moved
+    return np.asarray(np.where(degree > 0, moved, p)) if (degree == 0).any() else moved
 
 
 def step(cage: Cage, smooth: bool = True) -> Cage:

@@ -285,7 +285,7 @@ class Builder:
         fallback = node.value("fallback", node.value("default", 0.0))
         primvar = self._found(name)
         value = primvar.ComputeFlattened(self.ctx.time) if primvar else None
-        if value is None:
+        if primvar is None or value is None:
             return Value(three(fallback))
         self.ctx.used.add((str(primvar.GetAttr().GetPrimPath()), primvar.GetName()))
         self.ctx.used.add((str(primvar.GetAttr().GetPrimPath()), primvar.GetName() + ":indices"))
