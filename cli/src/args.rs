@@ -177,6 +177,9 @@ pub struct Stage {
     /// Level of subdivision surfaces [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=6))]
     pub subdivision: Option<u8>,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
     /// Any loss is an error
     #[arg(long)]
     pub strict: bool,
@@ -196,6 +199,7 @@ impl Stage {
             ("--stage-camera", self.stage_camera.is_some()),
             ("--render-settings", self.render_settings.is_some()),
             ("--subdivision", self.subdivision.is_some()),
+            ("--report", self.report.is_some()),
             ("--strict", self.strict),
             ("--keep-going", self.keep_going),
         ])
@@ -230,9 +234,6 @@ pub struct Convert {
     /// The scene to write
     #[arg(short, long, value_name = "SCENE.json")]
     pub output: PathBuf,
-    /// Write everything that was lost
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
     /// How to convert
     #[command(flatten)]
     pub options: Stage,

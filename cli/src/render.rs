@@ -39,7 +39,8 @@ fn one(a: &Render, kind: Kind) -> Outcome {
     // Whoever keeps the sums needs no picture.
     let default = a.aim.checkpoint.is_none().then_some(a.input.as_path());
     let targets = output::targets(&a.output, default)?;
-    for file in a.stats.iter().chain(&a.save_scene) {
+    let others = a.stats.iter().chain(&a.save_scene).chain(&a.stage.report);
+    for file in others {
         output::check_writable(file)?;
     }
     checkpoint::check(&a.aim)?;

@@ -58,7 +58,8 @@ fn shot(a: &Render, frame: f64) -> Render {
         .iter_mut()
         .chain(&mut a.aim.checkpoint)
         .chain(&mut a.stats)
-        .chain(&mut a.save_scene);
+        .chain(&mut a.save_scene)
+        .chain(&mut a.stage.report);
     for file in files {
         *file = frames::file(file, frame);
     }

@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub const SCENE: &str = "scene.json";
 /// The layers that it was made of.
 pub const LAYERS: &str = "layers.json";
+/// All that was lost.
+pub const REPORT: &str = "report.json";
 /// What the converter said.
 const LOSSES: &str = "losses.txt";
 

@@ -153,11 +153,14 @@ fn rendered_through_the_cache() {
     let first = scenes();
     assert_eq!(first.len(), 1);
 
-    // The same bytes written again: found, and the losses are said again.
+    // The same bytes written again: found, and the losses are said again, in full if they are asked for.
     write("(1, 0, 0)");
-    let out = run(&folder, python(), &RENDER);
+    let args = [&RENDER[..], &["--report", "losses.json"]].concat();
+    let out = run(&folder, python(), &args);
     assert!(said(&out).contains("clippingRange"), "{}", said(&out));
     assert_eq!(scenes(), first);
+    let report = std::fs::read_to_string(folder.join("losses.json")).unwrap();
+    assert!(report.contains("clippingRange"), "{report}");
 
     write("(0, 1, 0)");
     let out = run(&folder, python(), &RENDER);
