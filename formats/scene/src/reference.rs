@@ -99,7 +99,8 @@ impl Page {
 
 /// A row of a table.
 fn row(cells: &[&str]) -> String {
-    let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "\\|")).collect();
+    let plain = |c: &&str| c.replace('|', "\\|").replace('<', "&lt;");
+    let cells: Vec<String> = cells.iter().map(plain).collect();
     format!("| {} |\n", cells.join(" | "))
 }
 
