@@ -9,6 +9,7 @@ use super::program::{NAME, built, kept, read, repository, run, said, succeed};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
+use std::time::Instant;
 
 /// A folder outside of the repository that is gone afterwards.
 struct Scratch(PathBuf);
@@ -141,7 +142,10 @@ impl Reader {
             }
         }
         offline(&mut shell);
+        let start = Instant::now();
         let out = run(&mut shell);
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{}: {seconds:.1} s\n{}", self.at(block), block.text);
         self.said = said(&out);
         let fails = block.note == "fails";
         assert_eq!(
