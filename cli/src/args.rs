@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::failure::{Outcome, input};
+use crate::frames::Frames;
 use crate::values::{
     Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, layer,
     positive, share,
@@ -64,11 +65,12 @@ Examples:
   resolvent render scene.json -o out.exr --spp 4096 --checkpoint out.ckpt --resume    (again after a crash)
   resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt    (resolvent merge a.ckpt b.ckpt -o out.exr)
   resolvent render scene.json -o out.png --spp 16 --watch    (again after every change, until Ctrl-C)
+  resolvent render shot.usd --frames 1-100:2 -o shot.####.exr
 
-Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once.";
+Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once. Of a sequence it says which frames are left; frames that are there already are rendered again, unless --checkpoint shot.####.ckpt --resume has their sums.";
 
 /// Options of `render`.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(after_help = RENDER_EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
     /// A scene (.json), an OpenVDB file (.vdb), a glTF model (.gltf, .glb) or a USD stage (.usd, .usda, .usdc, .usdz)
@@ -143,7 +145,7 @@ pub struct Render {
     pub save_scene: Option<PathBuf>,
     /// Render again whenever the input, a file that it names or a plugin in use changes; a change ends the render in progress. Errors are
     /// shown, and leave the last picture as it is. Ctrl-C ends it
-    #[arg(long, conflicts_with_all = ["checkpoint", "save_scene"])]
+    #[arg(long, conflicts_with_all = ["checkpoint", "save_scene", "frames"])]
     pub watch: bool,
     /// One render of --watch: for the process that it starts
     #[arg(long, hide = true)]
@@ -154,12 +156,20 @@ pub struct Render {
 }
 
 /// Options of USD stages.
-#[derive(Debug, Default, ClapArgs)]
+#[derive(Clone, Debug, Default, ClapArgs)]
 #[command(next_help_heading = "USD stages")]
 pub struct Stage {
     /// Time code [default: the stage's start]
     #[arg(long, value_name = "T", value_parser = finite, allow_hyphen_values = true)]
     pub frame: Option<f64>,
+    /// A sequence, one file after the other: #### in its name is the frame's number, else .0001 goes before the suffix
+    #[arg(
+        long,
+        value_name = "A-B[:STEP]",
+        conflicts_with = "frame",
+        allow_hyphen_values = true
+    )]
+    pub frames: Option<Frames>,
     /// Select a variant; may be given several times
     #[arg(long, value_name = "/PRIM{SET=SELECTION}")]
     pub variant: Vec<String>,
@@ -175,6 +185,9 @@ pub struct Stage {
     /// Level of subdivision surfaces [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=6))]
     pub subdivision: Option<u8>,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
     /// Any loss is an error
     #[arg(long)]
     pub strict: bool,
@@ -188,11 +201,13 @@ impl Stage {
     pub fn given(&self) -> Option<&'static str> {
         first(&[
             ("--frame", self.frame.is_some()),
+            ("--frames", self.frames.is_some()),
             ("--variant", !self.variant.is_empty()),
             ("--purpose", self.purpose.is_some()),
             ("--stage-camera", self.stage_camera.is_some()),
             ("--render-settings", self.render_settings.is_some()),
             ("--subdivision", self.subdivision.is_some()),
+            ("--report", self.report.is_some()),
             ("--strict", self.strict),
             ("--keep-going", self.keep_going),
         ])
@@ -227,19 +242,13 @@ pub struct Convert {
     /// The scene to write
     #[arg(short, long, value_name = "SCENE.json")]
     pub output: PathBuf,
-    /// A sequence, one scene for each frame: #### in the output is the number
-    #[arg(long, value_name = "A-B[:STEP]", conflicts_with = "frame")]
-    pub frames: Option<String>,
-    /// Write everything that was lost
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
     /// How to convert
     #[command(flatten)]
     pub options: Stage,
 }
 
 /// How PNG files are made.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(next_help_heading = "Picture")]
 pub struct Tone {
     /// Exposure of PNG files, in stops
@@ -251,7 +260,7 @@ pub struct Tone {
 }
 
 /// What is kept of the work.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(next_help_heading = "Checkpoints")]
 pub struct Aim {
     /// Keep the exact sums in this file: now and then while rendering, and at the end
@@ -266,7 +275,7 @@ pub struct Aim {
 }
 
 /// Options that replace guesses about a VDB file or a model.
-#[derive(Debug, Default, ClapArgs)]
+#[derive(Clone, Debug, Default, ClapArgs)]
 #[command(next_help_heading = "VDB files and models (each replaces a guess)")]
 pub struct Guesses {
     /// Grid of densities
@@ -360,7 +369,7 @@ pub enum Up {
 }
 
 /// Where to look for plugins.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 pub struct PluginPath {
     /// Look for plugins here first, then in RESOLVENT_PLUGIN_PATH and beside the program; may be given several times
     #[arg(long, value_name = "DIR")]

@@ -16,10 +16,10 @@ use std::process::{Command, Stdio};
 pub fn convert(a: &Convert) -> Outcome {
     let python = Python::find()?;
     let mut command = command(&python, &a.stage, &a.output, &a.options);
-    if let Some(frames) = &a.frames {
+    if let Some(frames) = &a.options.frames {
         command.arg(format!("--frames={frames}"));
     }
-    report(&mut command, &a.report);
+    report(&mut command, &a.options.report);
     finish(command, &python, &a.stage)
 }
 
@@ -59,8 +59,9 @@ fn finish(mut command: Command, python: &Python, what: &Path) -> Outcome {
 pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let python = Python::find()?;
     let arguments = arguments(options);
-    let entry = cache::Entry::new(stage, &arguments, python.version())?;
+    let entry = cache::Entry::new(stage, &arguments, python.fingerprint())?;
     if let Some((scene, losses)) = entry.find() {
+        hand_out(&scene.with_file_name(cache::REPORT), options)?;
         say(&losses);
         crate::watch::reads(entry.layers());
         return Ok(scene);
@@ -68,11 +69,13 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let folder = entry.begin()?;
     let mut command = command(&python, stage, &folder.join(cache::SCENE), options);
     command.arg("--layers").arg(folder.join(cache::LAYERS));
+    report(&mut command, &Some(folder.join(cache::REPORT)));
     let out = command
         .stdout(Stdio::null())
         .output()
         .map_err(|e| python.broken(&e))?;
     let said = String::from_utf8_lossy(&out.stderr);
+    hand_out(&folder.join(cache::REPORT), options)?;
     if !out.status.success() {
         crate::watch::reads(cache::layers(folder));
         entry.discard();
@@ -92,6 +95,16 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let scene = entry.keep(&said)?;
     crate::watch::reads(entry.layers());
     Ok(scene)
+}
+
+/// Writes the report where it is asked for. A conversion that ended in an error has none.
+fn hand_out(report: &Path, options: &Stage) -> Outcome<()> {
+    match &options.report {
+        Some(file) if report.exists() => std::fs::copy(report, file)
+            .map(drop)
+            .map_err(|e| failed(format!("{}: {e}", file.display()))),
+        _ => Ok(()),
+    }
 }
 
 /// What the converter said, each loss a warning: the picture is not quite what the stage means.

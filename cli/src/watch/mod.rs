@@ -36,7 +36,8 @@ pub fn run(a: &Render) -> Outcome {
     console::set_quiet(a.quiet);
     interrupt::install(On::Tell);
     // What no change of a file can mend ends it at once.
-    crate::input::kind(&a.input)?;
+    let kind = crate::input::kind(&a.input)?;
+    crate::render::refuse(a, kind)?;
     let targets = output::targets(&a.output, Some(&a.input))?;
     if let Some(file) = &a.stats {
         output::check_writable(file)?;

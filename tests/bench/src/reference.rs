@@ -47,8 +47,8 @@ pub fn render(
     save(suite, case, &picture, &by)
 }
 
-/// Makes a reference of pictures that are independent of each other, such as a peer's with different seeds. Their spread, over
-/// 7 × 7 pixels, is its error.
+/// Makes a reference of pictures that are independent of each other, such as a peer's with different seeds. Their relative spread,
+/// over 7 × 7 pixels, is its error.
 pub fn merge(suite: &Suite, case: &Case, files: &[PathBuf], by: &str) -> Result<String> {
     let all: Vec<Picture> = files
         .iter()
@@ -69,33 +69,39 @@ pub fn merge(suite: &Suite, case: &Case, files: &[PathBuf], by: &str) -> Result<
     let mean: Vec<[f64; 3]> = (0..pixels)
         .map(|i| [0, 1, 2].map(|k| all.iter().map(|p| p.color[i][k]).sum::<f64>() / n))
         .collect();
-    let spread = |i: usize, k: usize| {
-        let d = |p: &Picture| (p.color[i][k] - mean[i][k]).powi(2);
-        all.iter().map(d).sum::<f64>() / (n - 1.0) / n
-    };
-    let variance = (all.len() > 1).then(|| {
-        let [w, h] = first.size;
-        let around = |i: usize| {
-            let (x, y) = (i % w, i / w);
-            let (xs, ys) = (
-                x.saturating_sub(3)..(x + 4).min(w),
-                y.saturating_sub(3)..(y + 4).min(h),
-            );
-            let count = (xs.len() * ys.len()) as f64;
-            let sum = |k: usize| -> f64 {
-                let row = |y: usize| xs.clone().map(|x| spread(y * w + x, k)).sum::<f64>();
-                ys.clone().map(row).sum()
-            };
-            [0, 1, 2].map(|k| sum(k) / count)
-        };
-        (0..pixels).map(around).collect()
-    });
+    let variance = (all.len() > 1).then(|| spread(&all, &mean));
     let picture = Picture {
         size: first.size,
         color: mean,
         variance,
     };
     save(suite, case, &picture, by)
+}
+
+/// Variance of the mean of several pictures, by their spread over 7 × 7 pixels: relative to what scores divide by, so that the
+/// noise of a lamp does not spread to the wall beside it.
+fn spread(all: &[Picture], mean: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let [w, h] = all[0].size;
+    let n = all.len() as f64;
+    let scale = |i: usize, k: usize| mean[i][k] * mean[i][k] + DARK;
+    let relative = |i: usize, k: usize| {
+        let d = |p: &Picture| (p.color[i][k] - mean[i][k]).powi(2);
+        all.iter().map(d).sum::<f64>() / (n - 1.0) / n / scale(i, k)
+    };
+    let around = |i: usize| {
+        let (x, y) = (i % w, i / w);
+        let (xs, ys) = (
+            x.saturating_sub(3)..(x + 4).min(w),
+            y.saturating_sub(3)..(y + 4).min(h),
+        );
+        let count = (xs.len() * ys.len()) as f64;
+        let sum = |k: usize| -> f64 {
+            let row = |y: usize| xs.clone().map(|x| relative(y * w + x, k)).sum::<f64>();
+            ys.clone().map(row).sum()
+        };
+        [0, 1, 2].map(|k| sum(k) / count * scale(i, k))
+    };
+    (0..w * h).map(around).collect()
 }
 
 fn save(suite: &Suite, case: &Case, picture: &Picture, by: &str) -> Result<String> {
@@ -134,4 +140,39 @@ pub fn write_scenes(suite: &Suite, cases: &[&Case], folder: &Path) -> Result<Vec
         .filter(|c| c.source != crate::suite::Source::File)
         .map(|c| suite.scene(c, folder))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A lamp of radiance 100 in a dim room: its noise is strong but relatively small, and must not count for the wall.
+    #[test]
+    fn a_lamp_leaves_the_wall_its_noise() {
+        let picture = |sign: f64| Picture {
+            size: [15, 15],
+            color: (0..225)
+                .map(|i| {
+                    [if i == 112 {
+                        100.0 + sign
+                    } else {
+                        0.1 + 1e-3 * sign
+                    }; 3]
+                })
+                .collect(),
+            variance: None,
+        };
+        let all = [picture(1.0), picture(-1.0)];
+        let mean: Vec<_> = (0..225)
+            .map(|i| [if i == 112 { 100.0 } else { 0.1 }; 3])
+            .collect();
+        let relative = |v: &[[f64; 3]]| {
+            let of = |(v, m): (&[f64; 3], &[f64; 3])| v[0] / (m[0] * m[0] + DARK);
+            v.iter().zip(&mean).map(of).sum::<f64>() / 225.0
+        };
+        // Half the squared difference, over two pictures.
+        let exact = (224.0 * 1e-6 / 0.02 + 1.0 / 10_000.01) / 225.0;
+        let found = relative(&spread(&all, &mean));
+        assert!((found / exact - 1.0).abs() < 1e-6, "{found} for {exact}");
+    }
 }

@@ -1,7 +1,7 @@
 //! The cheapest eight-wide hierarchy within a binary one, by dynamic programming.
 //!
 //! Ylitie, Karras, Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", §3.1, with leaf costs
-//! counted in packets. C(n, i) is the least surface-area cost of the subtree of n as a forest of at most i roots:
+//! counted in tests. C(n, i) is the least surface-area cost of the subtree of n as a forest of at most i roots:
 //!
 //!   C(n, 1) = min(leaf(n), A(n)·c_node + split(n, 8))
 //!   C(n, i) = min(split(n, i), C(n, i − 1))
@@ -13,9 +13,9 @@ use super::triangle::LANES;
 
 /// Cost of testing a node's eight boxes and sorting what is met.
 const NODE_COST: f32 = 1.0;
-/// Cost of testing a packet of triangles. The ratio was found with `examples/rays.rs`: 0.3 beats 0.5, 1 and 2, since larger leaves
-/// also save memory traffic.
-const PACKET_COST: f32 = 0.3;
+/// Cost of testing a quadric, or the triangles of a leaf, which are tested two packets at a time. The ratio was found with
+/// `examples/rays.rs`: 0.2 and 0.3 beat 0.5 and 1, and counting packets, since larger leaves also save memory traffic.
+const LEAF_COST: f32 = 0.3;
 /// Most primitives in one leaf: two packets of triangles, or as many quadrics.
 pub(super) const MAX_LEAF: u32 = 2 * LANES as u32;
 
@@ -53,7 +53,7 @@ impl Plan {
                 // The builder makes leaves of one primitive.
                 let quadric = is_quadric(binary.primitive_indices[node.first_index as usize]);
                 Entry {
-                    cost: [area * PACKET_COST; 7],
+                    cost: [area * LEAF_COST; 7],
                     left: [0; 7],
                     leaf: true,
                     triangles: u32::from(!quadric),
@@ -164,9 +164,9 @@ fn combine(area: f32, most: u32, left: &Entry, right: &Entry) -> Entry {
         let tests = if e.quadrics > 0 {
             e.quadrics
         } else {
-            e.triangles.div_ceil(LANES as u32)
+            e.triangles.div_ceil(MAX_LEAF)
         };
-        let cost = area * PACKET_COST * tests as f32;
+        let cost = area * LEAF_COST * tests as f32;
         if cost <= e.cost[0] {
             e.cost[0] = cost;
             e.leaf = true;

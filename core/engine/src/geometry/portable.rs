@@ -19,9 +19,9 @@ pub(super) trait Kernel: Copy {
     /// Starts loading what `child` leads to. A hint only.
     fn prefetch(self, tree: &Tree, child: Child);
 
-    /// Mask of triangles hit in (t_min, `t_max`\], with t and barycentrics in `hits`. These depend on ray and triangle alone,
-    /// not on `t_max`, which shrinks during a traversal.
-    fn packet(self, ray: &RaySetup, packet: &Packet, t_max: f32, hits: &mut PacketHits) -> u32;
+    /// Mask of triangles hit in (t_min, `t_max`\], with t and barycentrics in `hits`, of one or two packets (more are ignored).
+    /// t and barycentrics depend on ray and triangle alone, not on `t_max`, which shrinks during a traversal.
+    fn packets(self, ray: &RaySetup, packets: &[Packet], t_max: f32, hits: &mut PacketHits) -> u32;
 }
 
 /// Works on every processor.
@@ -71,7 +71,23 @@ impl Kernel for Portable {
     }
 
     #[inline(always)]
-    fn packet(self, ray: &RaySetup, packet: &Packet, t_max: f32, hits: &mut PacketHits) -> u32 {
+    fn packets(self, ray: &RaySetup, packets: &[Packet], t_max: f32, hits: &mut PacketHits) -> u32 {
+        let test = |(i, packet)| self.packet(ray, packet, LANES * i, t_max, hits) << (LANES * i);
+        packets.iter().take(2).enumerate().map(test).sum()
+    }
+}
+
+impl Portable {
+    /// One packet, whose hits start at lane `at`.
+    #[inline(always)]
+    fn packet(
+        self,
+        ray: &RaySetup,
+        packet: &Packet,
+        at: usize,
+        t_max: f32,
+        hits: &mut PacketHits,
+    ) -> u32 {
         let [kx, ky, kz] = ray.k;
         let mut p = [[[0.0f32; LANES]; 3]; 3];
         for (out, v) in p.iter_mut().zip(&packet.v) {
@@ -120,30 +136,32 @@ impl Kernel for Portable {
             if t > ray.t_min && t <= t_max {
                 found |= bit;
             }
-            hits.t[i] = t;
-            hits.u[i] = bv;
-            hits.v[i] = bw;
+            hits.t[at + i] = t;
+            hits.u[at + i] = bv;
+            hits.v[at + i] = bw;
         }
-        decide(ray, packet, t_max, hits, same & found, undecided)
+        let found = same & found & !undecided;
+        found | decide(ray, packet, at, t_max, hits, undecided)
     }
 }
 
-/// Resolves the `undecided` lanes in f64 and returns the final mask.
+/// Resolves the `undecided` lanes of a packet in f64 and returns which of them are hit. Its hits start at lane `at`.
 #[inline(always)]
 pub(super) fn decide(
     ray: &RaySetup,
     packet: &Packet,
+    at: usize,
     t_max: f32,
     hits: &mut PacketHits,
-    found: u32,
     mut undecided: u32,
 ) -> u32 {
-    let mut found = found & !undecided;
+    let mut found = 0;
     while undecided != 0 {
         let lane = undecided.trailing_zeros() as usize;
         undecided &= undecided - 1;
         if let Some((t, u, v)) = decide_lane(ray, packet, lane, t_max) {
-            (hits.t[lane], hits.u[lane], hits.v[lane]) = (t, u, v);
+            let to = (at + lane) % (2 * LANES);
+            (hits.t[to], hits.u[to], hits.v[to]) = (t, u, v);
             found |= 1 << lane;
         }
     }

@@ -9,7 +9,7 @@ use super::bvh8::{Child, Node8};
 use super::portable::{Kernel, Near, decide};
 use super::ray::{Ray, RaySetup};
 use super::traverse::{self, Candidate, Start, Tree};
-use super::triangle::{Packet, PacketHits, TINY_DET, gamma};
+use super::triangle::{LANES, Packet, PacketHits, TINY_DET, gamma};
 use super::two_level::{self, Instances, Placed};
 
 /// Proof that the processor has AVX2: only [`Avx2::detect`] makes one.
@@ -158,86 +158,126 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn packet(self, ray: &RaySetup, packet: &Packet, t_max: f32, hits: &mut PacketHits) -> u32 {
-        // SAFETY: `self` proves that AVX2 (hence SSE) is available. Each load reads one row of four f32; rows are 16 bytes
-        // apart in a struct aligned to 32; `k` is a permutation of the three axes. The stores write the rows of `hits`, aligned to 16.
-        unsafe {
-            let [kx, ky, kz] = ray.k;
-            let origin = |axis: usize| _mm_set1_ps(*ray.o.get_unchecked(axis));
-            let (ox, oy, oz) = (origin(kx), origin(ky), origin(kz));
-            let (sx, sy) = (_mm_set1_ps(ray.s[0]), _mm_set1_ps(ray.s[1]));
-            let shear = |v: &[[f32; 4]; 3]| {
-                let row = |axis: usize| _mm_load_ps(v.get_unchecked(axis).as_ptr());
-                let (x, y) = (_mm_sub_ps(row(kx), ox), _mm_sub_ps(row(ky), oy));
-                let z = _mm_sub_ps(row(kz), oz);
-                (
-                    _mm_sub_ps(x, _mm_mul_ps(sx, z)),
-                    _mm_sub_ps(y, _mm_mul_ps(sy, z)),
-                    z,
-                )
+    fn packets(self, ray: &RaySetup, packets: &[Packet], t_max: f32, hits: &mut PacketHits) -> u32 {
+        // A single packet fills both halves: what the upper one finds is masked away.
+        let (pair, lanes) = match packets {
+            [] => return 0,
+            [one] => ([one, one], 0xf),
+            [one, two, ..] => ([one, two], 0xff),
+        };
+        // SAFETY: `self` proves that AVX2 is available.
+        unsafe { packets_avx2(ray, pair, lanes, t_max, hits) }
+    }
+}
+
+/// Tests eight triangles and returns which of `lanes` are hit.
+#[target_feature(enable = "avx2")]
+#[inline]
+fn packets_avx2(
+    ray: &RaySetup,
+    pair: [&Packet; 2],
+    lanes: u32,
+    t_max: f32,
+    hits: &mut PacketHits,
+) -> u32 {
+    // SAFETY: Each load reads one row of four f32; rows are 16 bytes apart in a struct
+    // aligned to 32; `k` is a permutation of the three axes. The stores write the rows of `hits`, aligned to 32.
+    unsafe {
+        let [kx, ky, kz] = ray.k;
+        let origin = |axis: usize| _mm256_set1_ps(*ray.o.get_unchecked(axis));
+        let (ox, oy, oz) = (origin(kx), origin(ky), origin(kz));
+        let (sx, sy) = (_mm256_set1_ps(ray.s[0]), _mm256_set1_ps(ray.s[1]));
+        let shear = |vertex: usize| {
+            let row = |axis: usize| {
+                let half = |p: &Packet| {
+                    _mm_load_ps(p.v.get_unchecked(vertex).get_unchecked(axis).as_ptr())
+                };
+                _mm256_set_m128(half(pair[1]), half(pair[0]))
             };
-            let (ax, ay, az) = shear(&packet.v[0]);
-            let (bx, by, bz) = shear(&packet.v[1]);
-            let (cx, cy, cz) = shear(&packet.v[2]);
-            let u = _mm_sub_ps(_mm_mul_ps(cx, by), _mm_mul_ps(cy, bx));
-            let v = _mm_sub_ps(_mm_mul_ps(ax, cy), _mm_mul_ps(ay, cx));
-            let w = _mm_sub_ps(_mm_mul_ps(bx, ay), _mm_mul_ps(by, ax));
+            let (x, y) = (_mm256_sub_ps(row(kx), ox), _mm256_sub_ps(row(ky), oy));
+            let z = _mm256_sub_ps(row(kz), oz);
+            (
+                _mm256_sub_ps(x, _mm256_mul_ps(sx, z)),
+                _mm256_sub_ps(y, _mm256_mul_ps(sy, z)),
+                z,
+            )
+        };
+        let (ax, ay, az) = shear(0);
+        let (bx, by, bz) = shear(1);
+        let (cx, cy, cz) = shear(2);
+        let u = _mm256_sub_ps(_mm256_mul_ps(cx, by), _mm256_mul_ps(cy, bx));
+        let v = _mm256_sub_ps(_mm256_mul_ps(ax, cy), _mm256_mul_ps(ay, cx));
+        let w = _mm256_sub_ps(_mm256_mul_ps(bx, ay), _mm256_mul_ps(by, ax));
 
-            let differ = _mm_or_ps(_mm_xor_ps(u, v), _mm_xor_ps(v, w));
-            let same = !(_mm_movemask_ps(differ) as u32) & 15;
-            let nought = _mm_setzero_ps();
-            let zeros = _mm_or_ps(
-                _mm_or_ps(_mm_cmpeq_ps(u, nought), _mm_cmpeq_ps(v, nought)),
-                _mm_cmpeq_ps(w, nought),
-            );
-            let zero = _mm_movemask_ps(zeros) as u32;
-            if same | zero == 0 {
-                return 0;
-            }
-
-            let abs = |x| _mm_andnot_ps(_mm_set1_ps(-0.0), x);
-            let max3 = |a, b, c| _mm_max_ps(_mm_max_ps(abs(a), abs(b)), abs(c));
-            let splat = |x: f32| _mm_set1_ps(x);
-            let det = _mm_add_ps(_mm_add_ps(u, v), w);
-            let rcp = _mm_div_ps(splat(1.0), det);
-            let (bu, bv, bw) = (_mm_mul_ps(u, rcp), _mm_mul_ps(v, rcp), _mm_mul_ps(w, rcp));
-            let depth = _mm_add_ps(
-                _mm_add_ps(_mm_mul_ps(bu, az), _mm_mul_ps(bv, bz)),
-                _mm_mul_ps(bw, cz),
-            );
-            let t = _mm_mul_ps(depth, splat(ray.s[2]));
-            let (lo, hi) = (splat(ray.t_min), splat(t_max));
-            let inside = _mm_and_ps(_mm_cmpgt_ps(t, lo), _mm_cmple_ps(t, hi));
-
-            let (x, y, z) = (max3(ax, bx, cx), max3(ay, by, cy), max3(az, bz, cz));
-            let max_e = max3(u, v, w);
-            let g6 = splat(gamma(6));
-            let dx = _mm_mul_ps(g6, _mm_add_ps(x, z));
-            let dy = _mm_mul_ps(g6, _mm_add_ps(y, z));
-            let xy = _mm_mul_ps(_mm_mul_ps(splat(gamma(3)), x), y);
-            let de = _mm_mul_ps(
-                splat(2.0),
-                _mm_add_ps(_mm_add_ps(xy, _mm_mul_ps(dy, x)), _mm_mul_ps(dx, y)),
-            );
-            let spread = _mm_mul_ps(_mm_add_ps(_mm_mul_ps(g6, max_e), de), z);
-            let dt = _mm_mul_ps(
-                _mm_mul_ps(_mm_mul_ps(splat(3.0), spread), abs(rcp)),
-                splat(ray.s[2].abs()),
-            );
-            let near_end = _mm_or_ps(
-                _mm_cmple_ps(abs(_mm_sub_ps(t, lo)), dt),
-                _mm_cmple_ps(abs(_mm_sub_ps(t, splat(ray.t_max))), dt),
-            );
-            let tiny = _mm_cmplt_ps(abs(det), splat(TINY_DET));
-            let undecided = zero | (same & _mm_movemask_ps(_mm_or_ps(tiny, near_end)) as u32);
-            _mm_store_ps(hits.t.as_mut_ptr(), t);
-            _mm_store_ps(hits.u.as_mut_ptr(), bv);
-            _mm_store_ps(hits.v.as_mut_ptr(), bw);
-            let found = same & _mm_movemask_ps(inside) as u32;
-            if found | undecided == 0 {
-                return 0;
-            }
-            decide(ray, packet, t_max, hits, found, undecided)
+        let differ = _mm256_or_ps(_mm256_xor_ps(u, v), _mm256_xor_ps(v, w));
+        let same = !(_mm256_movemask_ps(differ) as u32) & lanes;
+        let nought = _mm256_setzero_ps();
+        let zeros = _mm256_or_ps(
+            _mm256_or_ps(
+                _mm256_cmp_ps::<_CMP_EQ_OQ>(u, nought),
+                _mm256_cmp_ps::<_CMP_EQ_OQ>(v, nought),
+            ),
+            _mm256_cmp_ps::<_CMP_EQ_OQ>(w, nought),
+        );
+        let zero = _mm256_movemask_ps(zeros) as u32 & lanes;
+        if same | zero == 0 {
+            return 0;
         }
+
+        let abs = |x| _mm256_andnot_ps(_mm256_set1_ps(-0.0), x);
+        let max3 = |a, b, c| _mm256_max_ps(_mm256_max_ps(abs(a), abs(b)), abs(c));
+        let splat = |x: f32| _mm256_set1_ps(x);
+        let det = _mm256_add_ps(_mm256_add_ps(u, v), w);
+        let rcp = _mm256_div_ps(splat(1.0), det);
+        let (bu, bv, bw) = (
+            _mm256_mul_ps(u, rcp),
+            _mm256_mul_ps(v, rcp),
+            _mm256_mul_ps(w, rcp),
+        );
+        let depth = _mm256_add_ps(
+            _mm256_add_ps(_mm256_mul_ps(bu, az), _mm256_mul_ps(bv, bz)),
+            _mm256_mul_ps(bw, cz),
+        );
+        let t = _mm256_mul_ps(depth, splat(ray.s[2]));
+        let (lo, hi) = (splat(ray.t_min), splat(t_max));
+        let inside = _mm256_and_ps(
+            _mm256_cmp_ps::<_CMP_GT_OQ>(t, lo),
+            _mm256_cmp_ps::<_CMP_LE_OQ>(t, hi),
+        );
+
+        let (x, y, z) = (max3(ax, bx, cx), max3(ay, by, cy), max3(az, bz, cz));
+        let max_e = max3(u, v, w);
+        let g6 = splat(gamma(6));
+        let dx = _mm256_mul_ps(g6, _mm256_add_ps(x, z));
+        let dy = _mm256_mul_ps(g6, _mm256_add_ps(y, z));
+        let xy = _mm256_mul_ps(_mm256_mul_ps(splat(gamma(3)), x), y);
+        let de = _mm256_mul_ps(
+            splat(2.0),
+            _mm256_add_ps(
+                _mm256_add_ps(xy, _mm256_mul_ps(dy, x)),
+                _mm256_mul_ps(dx, y),
+            ),
+        );
+        let spread = _mm256_mul_ps(_mm256_add_ps(_mm256_mul_ps(g6, max_e), de), z);
+        let dt = _mm256_mul_ps(
+            _mm256_mul_ps(_mm256_mul_ps(splat(3.0), spread), abs(rcp)),
+            splat(ray.s[2].abs()),
+        );
+        let near_end = _mm256_or_ps(
+            _mm256_cmp_ps::<_CMP_LE_OQ>(abs(_mm256_sub_ps(t, lo)), dt),
+            _mm256_cmp_ps::<_CMP_LE_OQ>(abs(_mm256_sub_ps(t, splat(ray.t_max))), dt),
+        );
+        let tiny = _mm256_cmp_ps::<_CMP_LT_OQ>(abs(det), splat(TINY_DET));
+        let undecided = zero | (same & _mm256_movemask_ps(_mm256_or_ps(tiny, near_end)) as u32);
+        _mm256_store_ps(hits.t.as_mut_ptr(), t);
+        _mm256_store_ps(hits.u.as_mut_ptr(), bv);
+        _mm256_store_ps(hits.v.as_mut_ptr(), bw);
+        let found = same & _mm256_movemask_ps(inside) as u32 & !undecided;
+        if undecided == 0 {
+            return found;
+        }
+        let (low, high) = (undecided & 0xf, undecided >> LANES);
+        let high = decide(ray, pair[1], LANES, t_max, hits, high);
+        found | decide(ray, pair[0], 0, t_max, hits, low) | high << LANES
     }
 }

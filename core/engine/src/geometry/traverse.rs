@@ -4,7 +4,7 @@ use super::bvh8::{Child, Node8};
 use super::portable::Kernel;
 use super::quadric::Quadric;
 use super::ray::RaySetup;
-use super::triangle::{Packet, PacketHits};
+use super::triangle::{LANES, Packet, PacketHits};
 
 /// Deepest hierarchy the builder makes, counted in nodes on a path from the root.
 pub(super) const MAX_DEPTH: usize = 36;
@@ -169,25 +169,25 @@ where
                 continue;
             }
             k.prefetch(tree, node.child[lane & 7]);
-            // Push in order of decreasing distance by insertion, then take the nearest off the top.
+            // The nearest stays in a register; the others are pushed in order of decreasing distance, by insertion.
             let base = height;
-            stack[height] = entry(near.0[lane & 7], node.child[lane & 7]);
-            height += 1;
+            let mut nearest = entry(near.0[lane & 7], node.child[lane & 7]);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & 7;
                 mask &= mask - 1;
                 k.prefetch(tree, node.child[lane]);
                 let new = entry(near.0[lane], node.child[lane]);
+                let later = nearest.max(new);
+                nearest = nearest.min(new);
                 let mut at = height;
-                while at > base && stack[at - 1] < new {
+                while at > base && stack[at - 1] < later {
                     stack[at] = stack[at - 1];
                     at -= 1;
                 }
-                stack[at] = new;
+                stack[at] = later;
                 height += 1;
             }
-            height -= 1;
-            current = Child(stack[height] as u32);
+            current = Child(nearest as u32);
         }
         if current.is_quadrics() {
             for quadric in &tree.quadrics[current.items()] {
@@ -205,15 +205,15 @@ where
             }
         } else {
             let mut hits = PacketHits::NONE;
-            for packet in &tree.packets[current.items()] {
-                let mut mask = k.packet(ray, packet, best.t, &mut hits);
+            for packets in tree.packets[current.items()].chunks(2) {
+                let mut mask = k.packets(ray, packets, best.t, &mut hits);
                 while mask != 0 {
-                    let i = mask.trailing_zeros() as usize & 3;
+                    let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     consider(
                         Candidate {
                             t: hits.t[i],
-                            prim: packet.prim[i],
+                            prim: packets[i / LANES].prim[i % LANES],
                             u: hits.u[i],
                             v: hits.v[i],
                         },
@@ -291,14 +291,14 @@ where
             }
         } else {
             let mut hits = PacketHits::NONE;
-            for packet in &tree.packets[current.items()] {
-                let mut mask = k.packet(ray, packet, t_max, &mut hits);
+            for packets in tree.packets[current.items()].chunks(2) {
+                let mut mask = k.packets(ray, packets, t_max, &mut hits);
                 while mask != 0 {
-                    let i = mask.trailing_zeros() as usize & 3;
+                    let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
                     if blocks(Candidate {
                         t: hits.t[i],
-                        prim: packet.prim[i],
+                        prim: packets[i / LANES].prim[i % LANES],
                         u: hits.u[i],
                         v: hits.v[i],
                     }) {

@@ -84,20 +84,20 @@ impl Packet {
     }
 }
 
-/// What a packet test found: valid in the lanes of the returned mask only.
+/// What a test of one or two packets found: valid in the lanes of the returned mask only. A second packet has the upper four.
 #[derive(Clone, Copy)]
-#[repr(C, align(16))]
+#[repr(C, align(32))]
 pub(super) struct PacketHits {
-    pub t: [f32; LANES],
-    pub u: [f32; LANES],
-    pub v: [f32; LANES],
+    pub t: [f32; 2 * LANES],
+    pub u: [f32; 2 * LANES],
+    pub v: [f32; 2 * LANES],
 }
 
 impl PacketHits {
     pub const NONE: Self = Self {
-        t: [0.0; LANES],
-        u: [0.0; LANES],
-        v: [0.0; LANES],
+        t: [0.0; 2 * LANES],
+        u: [0.0; 2 * LANES],
+        v: [0.0; 2 * LANES],
     };
 }
 

@@ -1,5 +1,6 @@
 //! From a description to a scene: plugins, geometry, lights, and the facts that choose the kernels.
 
+use super::hierarchy::Hierarchy;
 use super::instances::{Copies, Groups, emits};
 use super::interiors::{Collected, Interior, Interiors};
 use super::lights::{area, distant_light, emission_texture, shaping, spectrum, sun_sky};
@@ -50,6 +51,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Media in use.
     pub media: Vec<PlacedMedium>,
+    /// Over their bounds.
+    pub(super) hierarchy: Hierarchy,
     pub(crate) lights: Lights,
     pub(crate) camera: Camera,
     /// Bits of [`scene_traits`].
@@ -311,6 +314,12 @@ impl Scene {
             fades,
             chromatic,
             materials,
+            hierarchy: Hierarchy::new(
+                &media
+                    .iter()
+                    .map(|m| m.medium.info.bounds)
+                    .collect::<Vec<_>>(),
+            ),
             media,
             lights,
             camera,

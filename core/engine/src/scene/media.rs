@@ -81,7 +81,9 @@ impl View<'_> {
     fn fade(&self, s: &Segment, inside: u64, u: &FlightDraws) -> Result<(Flight, bool), Status> {
         let inside = self.scene.interiors.filling(inside);
         let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
-        for (i, m) in self.scene.media.iter().enumerate() {
+        let mut near = self.scene.hierarchy.walk();
+        while let Some(i) = near.next(s) {
+            let m = &self.scene.media[i];
             let Some(clipped) = within(m, inside, s) else {
                 continue;
             };
@@ -114,18 +116,17 @@ impl View<'_> {
         let inside = self.scene.interiors.filling(inside);
         // Find the nearest collision; a flight that starts beyond what is already reached need not be sampled.
         let (mut reached, mut winner, mut met) = (s.t1, None, 0u32);
-        let mut last = 0;
-        for (i, m) in media.iter().enumerate() {
-            let Some(clipped) = within(m, inside, &Segment { t1: reached, ..*s }) else {
+        let mut near = self.scene.hierarchy.walk();
+        loop {
+            let cut = Segment { t1: reached, ..*s };
+            let Some(i) = near.next(&cut) else { break };
+            let Some(clipped) = within(&media[i], inside, &cut) else {
                 continue;
             };
-            let flight = self.flight(m, &clipped, &keyed(u, i))?;
-            (met, last) = (met + 1, i);
-            if flight.collided() && flight.t < reached {
+            let flight = self.flight(&media[i], &clipped, &keyed(u, i))?;
+            met += 1;
+            if flight.collided() && (flight.t < reached || winner.is_none()) {
                 (reached, winner) = (flight.t, Some(i));
-            } else if flight.collided() && winner.is_none() {
-                winner = Some(i);
-                reached = flight.t;
             }
         }
         if met == 0 {
@@ -138,7 +139,14 @@ impl View<'_> {
             && self.scene.traits & scene_traits::EMISSIVE_MEDIA != 0;
         // Replay everything up to there: the same numbers give the same flight, cut short.
         let mut joint = Flight::vacuum(reached);
-        for (i, m) in media.iter().enumerate().take(last + 1) {
+        let mut near = self.scene.hierarchy.walk();
+        // The winner's own segment may begin where it collides.
+        let cut = Segment {
+            t1: reached.next_up(),
+            ..*s
+        };
+        while let Some(i) = near.next(&cut) {
+            let m = &media[i];
             let mut u = keyed(u, i);
             if alone {
                 let hero = u.prior[u.hero as usize];
@@ -201,7 +209,9 @@ impl View<'_> {
             _ => {
                 let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
                 let inside = self.scene.interiors.filling(inside);
-                for (i, m) in self.scene.media.iter().enumerate() {
+                let mut near = self.scene.hierarchy.walk();
+                while let Some(i) = near.next(s) {
+                    let m = &self.scene.media[i];
                     let Some(clipped) = within(m, inside, s) else {
                         continue;
                     };
@@ -223,7 +233,9 @@ impl View<'_> {
     pub(super) fn depth(&self, s: &Segment, inside: u64) -> Result<Spectrum, Status> {
         let mut depth = Spectrum::ZERO;
         let inside = self.scene.interiors.filling(inside);
-        for m in &self.scene.media {
+        let mut near = self.scene.hierarchy.walk();
+        while let Some(i) = near.next(s) {
+            let m = &self.scene.media[i];
             let Some(clipped) = within(m, inside, s) else {
                 continue;
             };

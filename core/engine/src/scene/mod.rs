@@ -1,6 +1,7 @@
 //! The scene: built once from its description, planned once, then only read.
 
 mod build;
+mod hierarchy;
 mod instances;
 mod interiors;
 mod lights;
