@@ -17,6 +17,7 @@ use resolvent_engine::plugin::{ForeignIntegrator, Message, Registry, set_log};
 use resolvent_engine::scene::Scene;
 use resolvent_engine::{Goal, Keep, Rendered, Settings, go_on, with_threads};
 use resolvent_scene as describe;
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// Runs the command.
@@ -116,7 +117,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         }
     };
     seconds.render = rendered.seconds;
-    warn_about(&rendered, &integrator);
+    warn_about(&rendered, &built, &integrator);
     let interrupted = rendered.interrupted;
     if interrupted && stats::total_samples(&rendered) == 0 {
         return Err(failed(
@@ -279,13 +280,27 @@ fn render(
     Ok(rendered)
 }
 
+/// The media whose majorants were violated, for messages.
+fn violated(scene: &Scene) -> String {
+    let media = scene.media.iter();
+    let media = media.filter(|m| m.violated.load(Ordering::Relaxed));
+    let names: Vec<_> = media
+        .map(|m| format!("'{}' ({})", m.name, m.medium.instance.plugin.title()))
+        .collect();
+    if names.is_empty() {
+        return String::new();
+    }
+    format!(" of the medium {}", names.join(", "))
+}
+
 /// What may make the picture wrong.
-fn warn_about(rendered: &Rendered, integrator: &ForeignIntegrator) {
+fn warn_about(rendered: &Rendered, scene: &Scene, integrator: &ForeignIntegrator) {
     let c = &rendered.counters;
     if c.violations > 0 {
         console::warning(format!(
-            "the extinction was above its majorant at {} points: a fault of a medium plugin, and the picture may be wrong",
-            c.violations
+            "the extinction was above its majorant at {} points{}: a fault of the plugin. Ratio tracking allows for it, free flights cannot: the picture may be wrong",
+            c.violations,
+            violated(scene)
         ));
     }
     if c.rejected > 0 {

@@ -1,6 +1,6 @@
 //! K at a vertex: frames, cosines and the corrections that keep transport symmetric, applied here and nowhere else.
 
-use resolvent_api::integrator::{Outcome, SceneView};
+use resolvent_api::integrator::{Outcome, SceneView, Stopped};
 use resolvent_api::operator::{Measure, Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample};
 use resolvent_api::{Vec3, Vertex, VertexKind};
 
@@ -34,9 +34,23 @@ pub fn eval(scene: &SceneView<'_>, v: &Vertex, wi: Vec3, mode: Mode) -> Outcome<
     };
     match e {
         Ok(e) if e.f.is_finite() && e.forward.is_finite() && e.reverse.is_finite() => Ok(e),
-        Ok(e) => Err(scene.fault(v, &format!("eval gave a value that is not finite: {e:?}"))),
-        Err(_) => Err(scene.fault(v, "panicked in eval")),
+        Ok(e) => {
+            let what = format!("eval gave a value that is not finite: {e:?}");
+            Err(broken(scene, v, &what, &format!("wi {wi:?}")))
+        }
+        Err(_) => Err(broken(scene, v, "panicked in eval", &format!("wi {wi:?}"))),
     }
+}
+
+/// Ends the render: what went wrong, and what the plugin had been asked.
+#[cold]
+fn broken(scene: &SceneView<'_>, v: &Vertex, what: &str, asked: &str) -> Stopped {
+    let frame = if v.is(VertexKind::Surface) {
+        format!(", shading normal {:?}", v.frame.n)
+    } else {
+        String::new()
+    };
+    scene.fault(v, &format!("{what} (wo {:?}, {asked}{frame})", v.wo))
 }
 
 /// Samples `wi`; the weight is f̄·D/density. Directions are in world coordinates.
@@ -56,11 +70,12 @@ pub fn sample(
     let mut s = match v.scatter.try_sample(local, u, mode) {
         Ok(Some(s)) => s,
         Ok(None) => return Ok(None),
-        Err(_) => return Err(scene.fault(v, "panicked in sample")),
+        Err(_) => return Err(broken(scene, v, "panicked in sample", &format!("{u:?}"))),
     };
     let good = s.weight.is_finite() && Vec3::from(s.wi).is_finite() && s.forward.is_finite();
     if !good {
-        return Err(scene.fault(v, &format!("sample gave a value that is not finite: {s:?}")));
+        let what = format!("sample gave a value that is not finite: {s:?}");
+        return Err(broken(scene, v, &what, &format!("{u:?}")));
     }
     if surface {
         let wi = v.frame.to_world(s.wi.into()).normalize();

@@ -223,3 +223,52 @@ fn tools_fail_clearly_too() {
     fails(&at, &["plugin", "info", &not], &["cloud_s.vdb"]);
     fails(&at, &["info", "."], &["is a folder"]);
 }
+
+/// Light that gets into a body with a hole, filled with what scatters without loss and without end, would never come out: neither would the
+/// picture.
+#[test]
+fn endless_walks() {
+    let at = folder("endless");
+    let scene = |albedo: f64, sides: &[[u32; 3]], place: &str| {
+        let mesh = json!({"type": "mesh", "interior": "milk", "indices": sides,
+            "positions": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]});
+        let mut s = json!({"resolvent": 1,
+            "camera": {"type": "perspective", "origin": [1, 2, 3], "target": [0.2, 0.2, 0.2], "fov_x_deg": 30},
+            "film": {"resolution": [8, 8]}, "sampling": {"spp": 4},
+            "lights": [{"type": "environment", "radiance": 1}],
+            "media": {"milk": {"plugin": "homogeneous", "params": {"sigma_t": 5, "albedo": albedo}}}});
+        if place == "world" {
+            s["shapes"] = json!([mesh]);
+        } else {
+            s["prototypes"] = json!({"bottle": [mesh]});
+            s["instances"] = json!([{"prototype": "bottle"}]);
+        }
+        let path = at.join("scene.json");
+        std::fs::write(&path, s.to_string()).unwrap_or_else(|e| panic!("{e}"));
+        ["render", "scene.json", "-q", "-o", "out.exr"]
+    };
+    let closed = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+    let turned = closed.map(|[a, b, c]| [a, c, b]);
+    let medium = [
+        "scene.json:",
+        "$.media.milk",
+        "'milk' scatters without loss",
+    ];
+    for (place, name) in [
+        ("world", "$.shapes[0]"),
+        ("prototype", "$.prototypes.bottle[0]"),
+    ] {
+        let of = |why| [&medium[..], &[name, why, "an albedo below 1"]].concat();
+        fails(
+            &at,
+            &scene(1.0, &closed[..3], place),
+            &of("is open: 3 of its edges"),
+        );
+        fails(&at, &scene(1.0, &turned, place), &of("is inside out"));
+        // What is closed ends, and so does what absorbs.
+        for (albedo, sides) in [(1.0, &closed[..]), (0.9, &closed[..3])] {
+            Run::new(&at, scene(albedo, sides, place)).done();
+            std::fs::remove_file(at.join("out.exr")).unwrap_or_else(|e| panic!("{e}"));
+        }
+    }
+}

@@ -172,4 +172,7 @@ fn violated_majorants_are_a_warning() {
         "{}",
         r.stderr
     );
+    let title = format!("'unruly' ({})", build::unruly("medium").display());
+    let words = ["of the medium 'cloud'", &title];
+    assert!(words.iter().all(|w| r.stderr.contains(w)), "{}", r.stderr);
 }

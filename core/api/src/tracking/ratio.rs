@@ -57,7 +57,9 @@ pub fn transmit<F: Field>(field: &F, s: &Segment, u: &FlightDraws) -> Flight {
                 fold(&mut ratio, &mut log_ratio);
                 rescale(&mut value, &mut ratio);
             }
-            if !(value.max_lane() > 0.0) {
+            // Below zero is where the extinction is above the majorant: rare and wrong of the field, and yet no bias, because the rate of
+            // the points may be any (Galtier et al. 2013).
+            if !(value.max_lane() > 0.0 || (zero - value).max_lane() > 0.0) {
                 return opaque(out);
             }
         }

@@ -1,6 +1,7 @@
 //! The checks accept tracking through a medium that is right, and reject the mistakes they are made for.
 
 use super::*;
+use crate::Moments;
 use resolvent_api::medium::medium_traits;
 use resolvent_api::tracking::{Tracked, Transmittance};
 use resolvent_api::{Aabb, Cell, Coefficients, Field, Lanes, MediumInfo};
@@ -217,6 +218,51 @@ fn a_majorant_that_is_too_small_is_found() {
     };
     let found = findings(&wrong, &ways()[..1]);
     assert!(found.iter().any(|f| f.contains("majorant")), "{found:?}");
+}
+
+/// Ratio tracking is right nevertheless: its points may have any rate. Where the extinction is 2.5 times its majorant, weights are negative.
+#[test]
+fn ratio_tracking_allows_for_majorants_that_are_too_small() {
+    let mut suite = Suite::new();
+    for (majorant, minorant) in [(0.8, 0.0), (0.4, 0.0), (0.9, 0.5)] {
+        let grey = ramp(3.0f32, majorant, minorant);
+        let colours = ramp(Spectrum::rgb(0.7, 2.0, 4.0), majorant, minorant);
+        let transmittance = Transmittance::Ratio;
+        let grey: &dyn Medium = &Tracked {
+            field: grey,
+            transmittance,
+        };
+        let colours: &dyn Medium = &Tracked {
+            field: colours,
+            transmittance,
+        };
+        for (name, medium, top) in [("grey", grey, 3.0), ("colours", colours, 0.7)] {
+            let s = ways()[0];
+            let (mut all, mut negative, mut violations) = (Moments::default(), 0, 0);
+            for i in 0..200_000 {
+                let u = draws(77, i, Spectrum::ONE);
+                let f = medium.transmit(&s, &u);
+                let density = f.ratio.mean(u.lanes);
+                all.add(f64::from(f.value[0] / density));
+                negative += u32::from(f.value[0] < 0.0);
+                violations += f.violations;
+            }
+            // ∫ top x dt where the segment is inside of the unit cube, x = x0 + t d.
+            let (o, d) = (Vec3::from(s.o), Vec3::from(s.d));
+            let inside = Aabb::new(Vec3::ZERO, Vec3::ONE).clip(o, d, s.t0, s.t1);
+            let (a, b) = inside.unwrap_or_else(|| panic!("it passes by"));
+            let x = |t: f32| f64::from(o.x + t * d.x);
+            let depth = top * f64::from(b - a) * 0.5 * (x(a) + x(b));
+            let what = format!("{name}, majorant {majorant}, minorant {minorant}");
+            assert!(violations > 1000, "{what}: {violations} violations");
+            assert!(
+                majorant > 0.5 || negative > 1000,
+                "{what}: {negative} negative"
+            );
+            suite.mean(what, &all, (-depth).exp(), 1e-6);
+        }
+    }
+    suite.assert();
 }
 
 /// Emission as its expectation, given even when another medium may cut the flight short: right alone, wrong in company.

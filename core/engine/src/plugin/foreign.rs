@@ -139,7 +139,7 @@ impl ForeignMedium {
         let mut out = std::mem::MaybeUninit::<Flight>::uninit();
         // SAFETY: a live instance of this table's plugin.
         let status = unsafe { f(self.pointer, s, u, out.as_mut_ptr()) };
-        check(status)?;
+        check(status).map_err(|f| on(s, f))?;
         // SAFETY: a call that returns OK has written its result; every bit pattern of a `Flight` is valid.
         let flight = unsafe { out.assume_init() };
         // One sum finds a NaN in any of them.
@@ -176,6 +176,12 @@ impl ForeignMedium {
         check(unsafe { (self.table.coefficients)(self.pointer, &p.to_array(), &mut out) })?;
         Ok(out)
     }
+}
+
+/// What was asked when it failed.
+#[cold]
+fn on(s: &Segment, f: Failure) -> Failure {
+    Failure(format!("{}, on {s:?}", f.0))
 }
 
 #[cold]

@@ -1,5 +1,6 @@
 //! From a description to a scene: plugins, geometry, lights, and the facts that choose the kernels.
 
+use super::enclosure::{self, Filled};
 use super::hierarchy::Hierarchy;
 use super::instances::{Copies, Groups, emits};
 use super::interiors::{Collected, Interior, Interiors};
@@ -19,6 +20,7 @@ use resolvent_api::{Aabb, Affine, PluginKind, Vec3};
 use resolvent_scene as describe;
 use std::borrow::Cow;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Lanes in use: red, green and blue.
@@ -123,6 +125,7 @@ impl Scene {
                 medium,
                 free,
                 interiors: 0,
+                violated: AtomicBool::new(false),
             });
         }
         let media_seconds = media_start.elapsed().as_secs_f64();
@@ -175,7 +178,9 @@ impl Scene {
                 body: 0,
             })
         };
-        for (described, wide) in scene.shapes.iter().zip(wide) {
+        // Which of the described shapes the first of these are.
+        let mut numbers = Vec::new();
+        for (number, (described, wide)) in scene.shapes.iter().zip(wide).enumerate() {
             let shape = wide.narrow(centre);
             let mut surface = behind(described, None)?;
             if let Some(e) = described.emission.filter(|_| emits(described)) {
@@ -192,6 +197,7 @@ impl Scene {
                 // It changes nothing: leave it out of the hierarchy.
                 continue;
             }
+            numbers.push(number);
             surfaces.push(surface);
             shapes.push(shape);
         }
@@ -256,6 +262,25 @@ impl Scene {
             )?,
             _ => Copies::default(),
         };
+        let endless = media.iter().filter(|m| enclosure::is_endless(m, lanes));
+        for medium in endless {
+            let world = accel.iter().flat_map(|a| &a.geometry().shapes);
+            let world = numbers.iter().zip(world).map(|(number, shape)| Filled {
+                described: &scene.shapes[*number],
+                place: format!("$.shapes[{number}]"),
+                shape,
+            });
+            enclosure::check(scene, medium, &materials, world)?;
+            for (name, described, shapes) in groups.bodies() {
+                let body = described.iter().zip(&shapes).enumerate();
+                let body = body.map(|(k, (described, shape))| Filled {
+                    described,
+                    place: format!("$.prototypes.{name}[{k}]"),
+                    shape,
+                });
+                enclosure::check(scene, medium, &materials, body)?;
+            }
+        }
         let interiors = collected
             .sort(surfaces.iter_mut().chain(copies.surfaces_mut()))
             .map_err(|n| {
@@ -459,7 +484,7 @@ fn absorbs_only(m: &PlacedMedium) -> bool {
     m.medium.info.traits & medium_traits::ABSORBS_ONLY != 0
 }
 
-fn materials_null(materials: &[Material], m: u32) -> bool {
+pub(super) fn materials_null(materials: &[Material], m: u32) -> bool {
     materials[m as usize].bsdf.is_null()
 }
 

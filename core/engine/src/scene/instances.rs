@@ -140,6 +140,15 @@ impl<'s> Groups<'s> {
         Ok((geometries, instances))
     }
 
+    /// The prototypes by name, with their shapes as they are and as they are intersected.
+    pub fn bodies(&self) -> impl Iterator<Item = (&str, &'s [describe::Shape], Vec<Shape>)> {
+        self.groups.iter().map(|group| {
+            let shapes = group.shapes.iter();
+            let shapes = shapes.map(|w| w.clone().narrow(group.middle())).collect();
+            (group.name, group.described, shapes)
+        })
+    }
+
     /// The surfaces of all instances: `surface` makes the one of a shape, given the material of the instance, and `light` turns an
     /// emitting one into a light.
     pub fn surfaces(

@@ -10,6 +10,7 @@ use resolvent_api::abi::{Status, scene_traits};
 use resolvent_api::operator::{Flight, FlightDraws, Segment, flight_flags};
 use resolvent_api::rng::derive;
 use resolvent_api::{Aabb, Spectrum};
+use std::sync::atomic::Ordering;
 
 /// Kernels without media.
 pub const NONE: u8 = 0;
@@ -254,6 +255,9 @@ impl View<'_> {
             .medium
             .sample(s, u)
             .map_err(|f| self.medium_failed(&m.medium, &m.name, &f.0))?;
+        if flight.violations > 0 {
+            m.violated.store(true, Ordering::Relaxed);
+        }
         self.count(|c| {
             c.flights += 1;
             c.collisions += u64::from(flight.event);
@@ -275,6 +279,9 @@ impl View<'_> {
             .medium
             .transmit(s, u)
             .map_err(|f| self.medium_failed(&m.medium, &m.name, &f.0))?;
+        if flight.violations > 0 {
+            m.violated.store(true, Ordering::Relaxed);
+        }
         self.count(|c| {
             c.transmittances += 1;
             c.nulls += u64::from(flight.nulls);

@@ -1,6 +1,7 @@
 //! The scene: built once from its description, planned once, then only read.
 
 mod build;
+mod enclosure;
 mod hierarchy;
 mod instances;
 mod interiors;
@@ -16,6 +17,7 @@ pub use normal_map::NormalMap;
 pub use view::{Counters, View};
 
 use crate::plugin::{ForeignBsdf, ForeignMedium};
+use std::sync::atomic::AtomicBool;
 
 /// What stands behind a shape.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,4 +76,6 @@ pub struct PlacedMedium {
     pub free: bool,
     /// Counters of the interiors that it fills.
     pub interiors: u64,
+    /// Its extinction was found above its majorant.
+    pub violated: AtomicBool,
 }

@@ -431,5 +431,6 @@ unsafe extern "C" fn fault(ctx: *const c_void, vertex: *const Vertex, message: T
     let (v, vertex, message) = unsafe { (view(ctx), &*vertex, message.to_owned()) };
     // What the plugin itself said, if it panicked.
     let why = pending_failure().map_or(message.clone(), |own| format!("{message}: {own}"));
-    v.fail(format!("{} {why}", v.scene.scatterer(vertex)))
+    let at = v.scene.centre + Vec3::from(vertex.p).as_dvec3();
+    v.fail(format!("{} {why}, at {at}", v.scene.scatterer(vertex)))
 }
