@@ -226,3 +226,39 @@ def test_loop_subdivision_is_reported(convert_text) -> None:
     found = convert_text(triangles % 'uniform token subdivisionScheme = "loop"')
     (loss,) = [x for x in found.report.losses if x.path == "/m"]
     assert (loss.kind, loss.what) == ("approximated", "subdivisionScheme") and "Loop" in loss.reason
+
+
+@pytest.mark.parametrize("level", [1, 3])
+def test_texture_coordinates_follow_creases(convert_text, level: int) -> None:
+    """Coordinates that are the positions stay the positions, over semi-sharp creases and corners as well (OpenSubdiv's rule for
+    face-varying data that are continuous)."""
+    rng = np.random.default_rng(4)
+    points, faces = grid(5)
+    points += rng.uniform(-0.3, 0.3, points.shape)
+    corners = np.concatenate(faces)
+    found = convert_text(
+        f"""def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
+    int[] faceVertexCounts = {[4] * len(faces)}
+    int[] faceVertexIndices = {corners.tolist()}
+    point3f[] points = {[tuple(p) for p in points.tolist()]}
+    int[] creaseIndices = [6, 7, 8, 13, 12, 11]
+    int[] creaseLengths = [3, 3]
+    float[] creaseSharpnesses = [1.5, 10]
+    int[] cornerIndices = [16, 18]
+    float[] cornerSharpnesses = [2.5, 10]
+    texCoord2f[] primvars:st = {[tuple(p) for p in points[corners, :2].tolist()]} (interpolation = "faceVarying")
+    rel material:binding = </m/mat>
+    def Material "mat" {{
+        token outputs:surface.connect = </m/mat/s.outputs:surface>
+        def Shader "s" {{
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </m/mat/t.outputs:rgb>
+            token outputs:surface
+        }}
+        def Shader "t" {{ uniform token info:id = "UsdUVTexture"; asset inputs:file = @./texture.png@; float3 outputs:rgb; }}
+    }}
+}}""",
+        subdivision=level,
+    )
+    (mesh,) = found.meshes()
+    assert np.abs(mesh["TEXCOORD_0"] - mesh["POSITION"][:, :2]).max() < 2e-6

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -177,15 +177,19 @@ class _Rules:
         )  # fmt: skip
 
     def cage(self, topology: Topology, data: Array) -> Cage:
+        return Cage(
+            topology.counts, topology.indices, np.asarray(data, dtype=float), self.crease_edges, self.crease_sharpness,
+            self.corner(topology), np.arange(len(topology.counts)),
+        )  # fmt: skip
+
+    def corner(self, topology: Topology) -> Floats:
+        """Sharpness of the points."""
         corner = np.zeros(topology.points)
         np.maximum.at(corner, self.corners, self.corner_sharpness)
         if self.boundary == "edgeAndCorner":
             # A corner of one face only stays where it is.
             corner[np.bincount(topology.indices, minlength=topology.points) == 1] = INFINITE
-        return Cage(
-            topology.counts, topology.indices, np.asarray(data, dtype=float), self.crease_edges, self.crease_sharpness,
-            corner, np.arange(len(topology.counts)),
-        )  # fmt: skip
+        return corner
 
 
 def _single(values: Array) -> Array:
@@ -285,14 +289,15 @@ def _face_varying_cage(topology: Topology, values: Array, rules: _Rules) -> Cage
     first, inverse = welds(topology, values)
     size = len(first)
     point = topology.indices[first]
-    # Creases of the mesh hold where the coordinates are continuous: both of an edge's sides have the same two values.
-    corner = np.zeros(size)
-    regions = np.bincount(point, minlength=topology.points)
+    regions = np.bincount(point, minlength=topology.points)[point]
+    # A point with one value keeps its own sharpness; one that is sharp for ever keeps all its values where they are.
+    own = rules.corner(topology)[point]
+    corner = np.where((regions == 1) | (own >= INFINITE), own, 0.0)
     if rules.face_varying in ("cornersOnly", "cornersPlus1", "cornersPlus2"):
         corner[np.bincount(inverse, minlength=size) == 1] = INFINITE
     if rules.face_varying in ("cornersPlus1", "cornersPlus2"):
         # Where three regions or more meet.
-        corner[regions[point] > 2] = INFINITE
+        corner[regions > 2] = INFINITE
     cage = Cage(
         topology.counts, inverse, np.asarray(values[first], dtype=float), np.empty((0, 2), dtype=np.int64), np.empty(0),
         corner, np.arange(len(topology.counts)),
@@ -304,4 +309,11 @@ def _face_varying_cage(topology: Topology, values: Array, rules: _Rules) -> Cage
         seam = sharp[of_corner]
         corner[inverse[seam]] = INFINITE
         corner[inverse[after[seam]]] = INFINITE
+    if len(rules.crease_edges):
+        # The mesh's creases hold where the coordinates are continuous; elsewhere there is a seam, which is sharp anyway.
+        mesh, edges = rules.cage(topology, np.empty((topology.points, 0))).edges, cage.edges
+        sharpness = np.zeros(len(edges.ends))
+        np.maximum.at(sharpness, edges.of_corner, mesh.sharpness[mesh.of_corner])
+        at = np.flatnonzero(sharpness)
+        cage = replace(cage, crease_edges=edges.ends[at], crease_sharpness=sharpness[at])
     return cage
