@@ -17,6 +17,10 @@ use std::sync::atomic::AtomicBool;
 const EDGE: u32 = 32;
 /// Samples per pixel.
 const SAMPLES: u32 = 16;
+/// Samples of a net, at the beginning of a pixel's sequence.
+const NET: u32 = 64;
+/// Seed of the pictures.
+const SEED: u64 = 7;
 
 /// A white ball in a white fog that fills a ball, in the light of a white sky: nothing is brighter than the sky.
 fn furnace() -> Value {
@@ -62,6 +66,7 @@ impl Stage {
             .canonicalize()
             .map_err(|e| e.to_string())?;
         scene["integrator"] = json!({"plugin": path, "params": params});
+        scene["film"] = json!({"resolution": [EDGE, EDGE]});
         let described = resolvent_scene::Scene::parse(scene.to_string().as_bytes(), "parameters")
             .map_err(|e| e.to_string())?;
         let scene = Scene::build(&described, &subject.registry).map_err(|e| e.to_string())?;
@@ -80,12 +85,16 @@ impl Stage {
     }
 
     fn picture(&self, samples: Range<u32>, threads: usize) -> Result<Rendered, String> {
+        self.seeded(SEED, samples, threads)
+    }
+
+    fn seeded(&self, seed: u64, samples: Range<u32>, threads: usize) -> Result<Rendered, String> {
         let settings = Settings {
             resolution: [EDGE; 2],
             window: [0, 0, EDGE, EDGE],
             samples,
             goal: Goal::Samples,
-            seed: 7,
+            seed,
             features: true,
             orders: 0,
         };
@@ -156,6 +165,8 @@ pub fn thorough(suite: &mut Suite, subject: &Subject, v: &Variant, stages: Stage
         }
         stages(property::PREFIX, &what);
         parts(suite, &what, &stage, &whole);
+        stages(property::SAMPLES, &what);
+        numbered(suite, &what, &stage);
     }
     Ok(())
 }
@@ -173,17 +184,20 @@ fn furnace_holds(suite: &mut Suite, what: &str, whole: &Rendered) {
     });
 }
 
-/// Two halves of the samples are the whole.
+/// Two halves of the samples are the whole. Integrators that splat may have chains, one for each net: they are divided between nets.
 fn parts(suite: &mut Suite, what: &str, stage: &Stage, whole: &Rendered) {
     suite.about(property::PREFIX);
-    let half = SAMPLES / 2;
+    let chains = whole.film.has_splats();
+    let half = if chains { NET } else { SAMPLES / 2 };
+    let longer = chains.then(|| stage.picture(0..2 * half, 0));
     let parts = stage
         .picture(0..half, 0)
-        .and_then(|a| Ok((a, stage.picture(half..SAMPLES, 0)?)));
-    let Ok((a, b)) = parts else {
+        .and_then(|a| Ok((a, stage.picture(half..2 * half, 0)?, longer.transpose()?)));
+    let Ok((a, b, longer)) = parts else {
         suite.claim(false, || format!("{what}: a part of the samples fails"));
         return;
     };
+    let whole = longer.as_ref().unwrap_or(whole);
     for i in 0..(EDGE * EDGE) as usize {
         let (a, b, all) = (
             a.film.estimate(i),
@@ -201,4 +215,19 @@ fn parts(suite: &mut Suite, what: &str, stage: &Stage, whole: &Rendered) {
             });
         }
     }
+}
+
+/// Samples of another number are other samples. Two parts alone don't show that: pieces of work may begin in the same places as in
+/// the whole.
+fn numbered(suite: &mut Suite, what: &str, stage: &Stage) {
+    suite.about(property::SAMPLES);
+    let one = |seed, i| stage.seeded(seed, i..i + 1, 0).map(|r| bits(&r));
+    let (Ok(first), Ok(second), Ok(other)) = (one(SEED, 0), one(SEED, 1), one(SEED + 1, 0)) else {
+        suite.claim(false, || format!("{what}: a single sample fails"));
+        return;
+    };
+    // Where no seed changes anything, there are no random numbers that could repeat.
+    suite.claim(first != second || first == other, || {
+        format!("{what}: samples 0 and 1 are the same in every pixel: their numbers don't count")
+    });
 }

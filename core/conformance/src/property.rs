@@ -41,7 +41,7 @@ pub const PREFIX: &str = "prefix";
 /// Bounds and traits are true of the coefficients.
 pub const FACTS: &str = "facts";
 
-/// Every sample is finite, and each pixel gets as many as were asked for.
+/// Every sample is finite, each pixel gets as many as were asked for, and no two of them are the same on purpose.
 pub const SAMPLES: &str = "samples";
 
 /// No call fails that has nothing wrong with its input; panics stay inside.

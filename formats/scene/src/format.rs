@@ -161,6 +161,7 @@ pub(crate) struct Field {
     pub name: &'static str,
     pub kind: Kind,
     pub required: bool,
+    /// One sentence; what holds if the key is left out stands at its end, in parentheses.
     pub help: &'static str,
 }
 
@@ -725,7 +726,7 @@ static SUN_SKY: Object = Object {
         may(
             "sun",
             Kind::Bool,
-            "There is a sun's disc (true); the ground shows its light in any case",
+            "There is a sun's disc; the ground shows its light in any case (true)",
         ),
         may(
             "sun_angle_deg",

@@ -7,7 +7,8 @@
 //! - [`Scene::write`], [`Scene::to_text`]: back to JSON, which reads as an equal scene.
 //! - [`declare`]: what plugins declare about their parameters. [`PluginDecl::check`] compares a
 //!   [`PluginBlock`] with it and fills in defaults.
-//! - [`schema()`]: the JSON Schema of the format and of the plugins given.
+//! - [`schema()`]: the JSON Schema of the format and of the plugins given; [`scene_reference`], [`plugin_reference`]: the same as
+//!   pages for people.
 //!
 //! # The format
 //!
@@ -53,6 +54,7 @@ mod parse;
 mod plugin;
 mod read;
 mod read_texture;
+mod reference;
 mod schema;
 pub mod table;
 mod texture;
@@ -66,6 +68,7 @@ pub use format::VERSION;
 pub use indexmap::IndexMap;
 pub use nearest::nearest;
 pub use plugin::{Param, PluginBlock, Value};
+pub use reference::{plugin_reference, scene_reference};
 pub use schema::schema;
 pub use texture::{
     ColorSpace, ImageSource, MemoryImage, NormalMap, Texture, TextureChannel, TextureFilter,

@@ -115,6 +115,8 @@ fn integrators() {
             ("OWN_RANDOM", "determinism"),
             ("NOT_FINITE", "samples"),
             ("BRIGHT", "energy"),
+            ("BRIGHTENS", "energy"),
+            ("REPEATS", "samples"),
             ("FIRST", "prefix"),
             ("FEW", "failures"),
         ],

@@ -206,6 +206,10 @@ impl Registry {
     /// # Errors
     /// If it cannot be loaded.
     pub fn open(&self, path: &Path) -> Result<Arc<Plugin>> {
+        // The system looks for a name without a folder everywhere but here.
+        let here = Path::new(".").join(path);
+        let bare = path.parent() == Some(Path::new(""));
+        let path = if bare { &here } else { path };
         let key = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let mut loaded = self.loaded.lock().unwrap_or_else(|e| e.into_inner());
         if let Some(plugin) = loaded.get(&key) {
