@@ -1,6 +1,7 @@
 //! The command line.
 
 use crate::failure::{Outcome, input};
+use crate::frames::Frames;
 use crate::values::{
     Color, MaybeColor, MaybeDirection, Samples, Size, View, Window, cosine, finite, layer,
     positive, share,
@@ -63,11 +64,12 @@ Examples:
   resolvent render scene.json -o tile.exr --crop 0,0,320,180
   resolvent render scene.json -o out.exr --spp 4096 --checkpoint out.ckpt --resume    (again after a crash)
   resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt    (resolvent merge a.ckpt b.ckpt -o out.exr)
+  resolvent render shot.usd --frames 1-100:2 -o shot.####.exr
 
-Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once.";
+Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once. Of a sequence it says which frames are left; frames that are there already are rendered again, unless --checkpoint shot.####.ckpt --resume has their sums.";
 
 /// Options of `render`.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(after_help = RENDER_EXAMPLES, allow_negative_numbers = true)]
 pub struct Render {
     /// A scene (.json), an OpenVDB file (.vdb), a glTF model (.gltf, .glb) or a USD stage (.usd, .usda, .usdc, .usdz)
@@ -146,12 +148,20 @@ pub struct Render {
 }
 
 /// Options of USD stages.
-#[derive(Debug, Default, ClapArgs)]
+#[derive(Clone, Debug, Default, ClapArgs)]
 #[command(next_help_heading = "USD stages")]
 pub struct Stage {
     /// Time code [default: the stage's start]
     #[arg(long, value_name = "T", value_parser = finite, allow_hyphen_values = true)]
     pub frame: Option<f64>,
+    /// A sequence, one file after the other: #### in its name is the frame's number, else .0001 goes before the suffix
+    #[arg(
+        long,
+        value_name = "A-B[:STEP]",
+        conflicts_with = "frame",
+        allow_hyphen_values = true
+    )]
+    pub frames: Option<Frames>,
     /// Select a variant; may be given several times
     #[arg(long, value_name = "/PRIM{SET=SELECTION}")]
     pub variant: Vec<String>,
@@ -167,6 +177,9 @@ pub struct Stage {
     /// Level of subdivision surfaces [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=6))]
     pub subdivision: Option<u8>,
+    /// Write everything that was lost
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
     /// Any loss is an error
     #[arg(long)]
     pub strict: bool,
@@ -180,11 +193,13 @@ impl Stage {
     pub fn given(&self) -> Option<&'static str> {
         first(&[
             ("--frame", self.frame.is_some()),
+            ("--frames", self.frames.is_some()),
             ("--variant", !self.variant.is_empty()),
             ("--purpose", self.purpose.is_some()),
             ("--stage-camera", self.stage_camera.is_some()),
             ("--render-settings", self.render_settings.is_some()),
             ("--subdivision", self.subdivision.is_some()),
+            ("--report", self.report.is_some()),
             ("--strict", self.strict),
             ("--keep-going", self.keep_going),
         ])
@@ -219,19 +234,13 @@ pub struct Convert {
     /// The scene to write
     #[arg(short, long, value_name = "SCENE.json")]
     pub output: PathBuf,
-    /// A sequence, one scene for each frame: #### in the output is the number
-    #[arg(long, value_name = "A-B[:STEP]", conflicts_with = "frame")]
-    pub frames: Option<String>,
-    /// Write everything that was lost
-    #[arg(long, value_name = "FILE.json")]
-    pub report: Option<PathBuf>,
     /// How to convert
     #[command(flatten)]
     pub options: Stage,
 }
 
 /// How PNG files are made.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(next_help_heading = "Picture")]
 pub struct Tone {
     /// Exposure of PNG files, in stops
@@ -243,7 +252,7 @@ pub struct Tone {
 }
 
 /// What is kept of the work.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 #[command(next_help_heading = "Checkpoints")]
 pub struct Aim {
     /// Keep the exact sums in this file: now and then while rendering, and at the end
@@ -258,7 +267,7 @@ pub struct Aim {
 }
 
 /// Options that replace guesses about a VDB file or a model.
-#[derive(Debug, Default, ClapArgs)]
+#[derive(Clone, Debug, Default, ClapArgs)]
 #[command(next_help_heading = "VDB files and models (each replaces a guess)")]
 pub struct Guesses {
     /// Grid of densities
@@ -352,7 +361,7 @@ pub enum Up {
 }
 
 /// Where to look for plugins.
-#[derive(Debug, ClapArgs)]
+#[derive(Clone, Debug, ClapArgs)]
 pub struct PluginPath {
     /// Look for plugins here first, then in RESOLVENT_PLUGIN_PATH and beside the program; may be given several times
     #[arg(long, value_name = "DIR")]

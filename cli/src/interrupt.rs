@@ -19,6 +19,8 @@ pub enum Phase {
     Rendering = 1,
     /// It is being saved.
     Writing = 2,
+    /// Frames are saved, and the next one is being prepared.
+    Between = 3,
 }
 
 /// Tells what the program is doing now.
@@ -40,6 +42,8 @@ pub fn install() {
         }
         console::line(if phase == Phase::Writing as u8 {
             "the picture is being written; Ctrl-C again aborts"
+        } else if phase == Phase::Between as u8 {
+            "stopping before the next frame; Ctrl-C again aborts"
         } else {
             "stopping and saving what is finished; Ctrl-C again aborts"
         });

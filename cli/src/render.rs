@@ -9,6 +9,7 @@ use crate::interrupt::{self, Phase};
 use crate::output::{self, Target};
 use crate::overrides::{self, Plan};
 use crate::progress::Display;
+use crate::sequence;
 use crate::stats::{self, About, Certainty, Seconds};
 use resolvent_api::{Affine, PluginKind};
 use resolvent_engine::plugin::{ForeignIntegrator, Message, Registry, set_log};
@@ -26,10 +27,20 @@ pub fn run(a: &Render) -> Outcome {
         Message::Info(text) => console::info(text),
     });
     let kind = crate::input::kind(&a.input)?;
+    refuse(a, kind)?;
+    match &a.stage.frames {
+        Some(frames) => sequence::run(a, frames, |a| one(a, kind)),
+        None => one(a, kind),
+    }
+}
+
+/// Renders one picture.
+fn one(a: &Render, kind: Kind) -> Outcome {
     // Whoever keeps the sums needs no picture.
     let default = a.aim.checkpoint.is_none().then_some(a.input.as_path());
     let targets = output::targets(&a.output, default)?;
-    for file in a.stats.iter().chain(&a.save_scene) {
+    let others = a.stats.iter().chain(&a.save_scene).chain(&a.stage.report);
+    for file in others {
         output::check_writable(file)?;
     }
     checkpoint::check(&a.aim)?;
@@ -158,8 +169,8 @@ fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
     input(text)
 }
 
-/// The description of what to render.
-fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
+/// Refuses options that are for other inputs.
+fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
     if let (Kind::Scene | Kind::Usd, Some(option)) = (kind, a.guesses.given()) {
         let what = if kind == Kind::Usd {
             "USD stage"
@@ -177,6 +188,11 @@ fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
             a.input.display()
         )));
     }
+    Ok(())
+}
+
+/// The description of what to render.
+fn describe(a: &Render, kind: Kind) -> Outcome<describe::Scene> {
     match kind {
         Kind::Scene => describe::Scene::read(&a.input).map_err(input),
         Kind::Usd => {

@@ -1,6 +1,6 @@
 //! Converted stages, kept as long as nothing that they were made of changes.
 //!
-//! An entry is a folder, named by a hash of the stage's path, the options and the converter's version. It holds the scene with its
+//! An entry is a folder, named by a hash of the stage's path, the options and the converter's fingerprint. It holds the scene with its
 //! files, what the converter said, and the list of all layers that were read with hashes of their bytes: it counts only while
 //! all of these are the same. So there is one entry for each stage and choice of options, however often the stage changes.
 
@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub const SCENE: &str = "scene.json";
 /// The layers that it was made of.
 pub const LAYERS: &str = "layers.json";
+/// All that was lost.
+pub const REPORT: &str = "report.json";
 /// What the converter said.
 const LOSSES: &str = "losses.txt";
 
@@ -27,11 +29,11 @@ pub struct Entry {
 }
 
 impl Entry {
-    /// The place of a stage's conversion with these options by this version of the converter.
-    pub fn new(stage: &Path, options: &[OsString], version: &str) -> Outcome<Self> {
+    /// The place of a stage's conversion with these options by this converter.
+    pub fn new(stage: &Path, options: &[OsString], converter: &str) -> Outcome<Self> {
         let stage = std::path::absolute(stage).map_err(failed)?;
         let mut key = Blake2b::<U16>::new();
-        let parts = [stage.as_os_str(), version.as_ref()];
+        let parts = [stage.as_os_str(), converter.as_ref()];
         for part in parts
             .into_iter()
             .chain(options.iter().map(|o| o.as_os_str()))

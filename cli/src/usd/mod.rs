@@ -16,10 +16,10 @@ use std::process::{Command, Stdio};
 pub fn convert(a: &Convert) -> Outcome {
     let python = Python::find()?;
     let mut command = command(&python, &a.stage, &a.output, &a.options);
-    if let Some(frames) = &a.frames {
+    if let Some(frames) = &a.options.frames {
         command.arg(format!("--frames={frames}"));
     }
-    report(&mut command, &a.report);
+    report(&mut command, &a.options.report);
     finish(command, &python, &a.stage)
 }
 
@@ -59,19 +59,22 @@ fn finish(mut command: Command, python: &Python, what: &Path) -> Outcome {
 pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let python = Python::find()?;
     let arguments = arguments(options);
-    let entry = cache::Entry::new(stage, &arguments, python.version())?;
+    let entry = cache::Entry::new(stage, &arguments, python.fingerprint())?;
     if let Some((scene, losses)) = entry.find() {
+        hand_out(&scene.with_file_name(cache::REPORT), options)?;
         say(&losses);
         return Ok(scene);
     }
     let folder = entry.begin()?;
     let mut command = command(&python, stage, &folder.join(cache::SCENE), options);
     command.arg("--layers").arg(folder.join(cache::LAYERS));
+    report(&mut command, &Some(folder.join(cache::REPORT)));
     let out = command
         .stdout(Stdio::null())
         .output()
         .map_err(|e| python.broken(&e))?;
     let said = String::from_utf8_lossy(&out.stderr);
+    hand_out(&folder.join(cache::REPORT), options)?;
     if !out.status.success() {
         entry.discard();
         // The converter's own words; its last line is the error.
@@ -88,6 +91,16 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     }
     say(&said);
     entry.keep(&said)
+}
+
+/// Writes the report where it is asked for. A conversion that ended in an error has none.
+fn hand_out(report: &Path, options: &Stage) -> Outcome<()> {
+    match &options.report {
+        Some(file) if report.exists() => std::fs::copy(report, file)
+            .map(drop)
+            .map_err(|e| failed(format!("{}: {e}", file.display()))),
+        _ => Ok(()),
+    }
 }
 
 /// What the converter said, each loss a warning: the picture is not quite what the stage means.

@@ -13,7 +13,7 @@ const SOURCES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../formats/usd");
 /// An interpreter that has the package.
 pub struct Python {
     path: PathBuf,
-    version: String,
+    fingerprint: String,
 }
 
 impl Python {
@@ -54,10 +54,10 @@ impl Python {
         )))
     }
 
-    /// Asks an interpreter for the package's version.
+    /// Asks an interpreter for the package.
     fn probe(path: &Path) -> Result<Self, String> {
         let out = Command::new(path)
-            .args(["-c", "import resolvent_usd as r; print(r.__version__)"])
+            .args(["-c", "import resolvent_usd as r; print(r.fingerprint())"])
             .stdin(Stdio::null())
             .output()
             .map_err(|e| e.to_string())?;
@@ -67,13 +67,13 @@ impl Python {
         }
         Ok(Self {
             path: path.to_path_buf(),
-            version: String::from_utf8_lossy(&out.stdout).trim().to_owned(),
+            fingerprint: String::from_utf8_lossy(&out.stdout).trim().to_owned(),
         })
     }
 
-    /// Version of the package.
-    pub fn version(&self) -> &str {
-        &self.version
+    /// Of the package and of what it stands on.
+    pub fn fingerprint(&self) -> &str {
+        &self.fingerprint
     }
 
     /// A call of the interpreter. It finds this program by `RESOLVENT_PROGRAM`, to ask it what is in VDB files.

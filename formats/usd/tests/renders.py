@@ -16,13 +16,15 @@ import numpy as np
 import pytest
 
 
-def program() -> str:
+def program_or_none() -> str | None:
     """The ``resolvent`` command: ``RESOLVENT_PROGRAM``, that of this repository's build, or that in PATH."""
     built = Path(__file__).resolve().parents[3] / "target" / "release" / "resolvent"
-    for found in (os.environ.get("RESOLVENT_PROGRAM"), str(built) if built.exists() else None, shutil.which("resolvent")):
-        if found:
-            return found
-    pytest.skip("the resolvent command is not built: cargo build --release")
+    return os.environ.get("RESOLVENT_PROGRAM") or (str(built) if built.exists() else shutil.which("resolvent"))
+
+
+def program() -> str:
+    """The same, without which there is no test."""
+    return program_or_none() or pytest.skip("the resolvent command is not built: cargo build --release")
 
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:

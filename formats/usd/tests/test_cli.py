@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import DATA
 from pxr import Usd, UsdGeom
-from resolvent_usd.cli import main
+from resolvent_usd.cli import main, scene_files
 
 MOVING = """#usda 1.0
 (
@@ -46,6 +46,9 @@ def test_frames(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [sphere(tmp_path / n) for n in names] == [(0, 1), (4, 2), (4, 3)]
     assert main([str(stage), "-o", str(tmp_path / "f##.json"), "--frames", "4-4"]) == 0
     assert (tmp_path / "f04.json").exists()
+    # As resolvent render names its pictures.
+    for frame, name in ((-5, "shot.-005.json"), (2.5, "shot.0002.5.json"), (0.1 + 0.2, "shot.0000.3.json"), (1e6, "shot.1000000.json")):
+        assert scene_files(Path("shot.json"), [frame]) == [Path(name)]
 
 
 def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

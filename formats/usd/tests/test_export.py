@@ -161,3 +161,16 @@ def test_the_stage_itself(tmp_path: Path) -> None:
     there_and_back(scene(), tmp_path)
     stage = Usd.Stage.Open(str(tmp_path / "scene.usda"))
     assert UsdGeom.GetStageUpAxis(stage) == "Y" and str(stage.GetDefaultPrim().GetPath()) == "/World"
+
+
+@pytest.mark.parametrize(
+    "name", ["own/assembly.usda", "own/cloud_volume.usda", "openusd/Instancing/instancedCubes.usda", "openusd/PreviewSurface/testPreviewSurfaceTransform2d.usda"]
+)
+def test_stages_go_round_with_equal_renders(tmp_path: Path, name: str) -> None:
+    """USD, scene, USD, scene: one picture, and nothing is lost on the way back."""
+    first = convert_file(DATA / name, tmp_path / "scene.json", keep_going=True).scene
+    lights = [{"type": "environment", "radiance": [0.5, 0.6, 0.7]}, {"type": "distant", "to_light": [1, 2, 1.5], "irradiance": 1, "angle_deg": 3}]
+    first["lights"] = first.get("lights", []) or lights
+    back, report = there_and_back(first, tmp_path)
+    assert report.losses == []
+    same_picture(first, back, tmp_path, spp=32)

@@ -146,3 +146,39 @@ def test_wrong_instancers_name_the_attribute(convert_text, extra: str, words: st
         convert_text(text)
     found = convert_text(text, keep_going=True)
     assert [x.kind for x in found.report.losses if x.path.startswith("/pi")] == ["failed"]
+
+
+@pytest.mark.parametrize("interpolation", ["vertex", "varying", "uniform"])
+def test_colours_per_instance_are_reported(convert_text, interpolation: str) -> None:
+    """The scene has one look for all copies of a prototype: the instancer's values are a loss, by path, and no error."""
+    colors = f'color3f[] primvars:displayColor = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0)] (interpolation = "{interpolation}")'
+    found = convert_text(INSTANCER % colors)
+    assert [x for x in found.losses("/pi")] == ["primvars:displayColor: values per instance are not there"]
+    assert len(list(found.copies())) == 4
+
+
+def test_native_instances_have_their_own_colours(convert_text) -> None:
+    """displayColor of the instance itself, and a primvar that its material reads: a prototype for each that differs."""
+    found = convert_text("""
+over "asset" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    def Mesh "m" {""" + QUAD + """ }
+    def Mesh "n" (prepend apiSchemas = ["MaterialBindingAPI"]) {""" + QUAD + """; rel material:binding = </asset/mat>; }
+    def Material "mat" {
+        token outputs:surface.connect = </asset/mat/s.outputs:surface>
+        def Shader "s" {
+            uniform token info:id = "UsdPreviewSurface"
+            float inputs:roughness.connect = </asset/mat/r.outputs:result>
+            token outputs:surface
+        }
+        def Shader "r" { uniform token info:id = "UsdPrimvarReader_float"; string inputs:varname = "rough"; float outputs:result; }
+    }
+}
+def Xform "world" {
+    def "a" (instanceable = true; references = </asset>) { color3f[] primvars:displayColor = [(1, 0, 0)]; float primvars:rough = 0.25; }
+    def "b" (instanceable = true; references = </asset>) { color3f[] primvars:displayColor = [(0, 1, 0)]; float primvars:rough = 0.75; }
+    def "c" (instanceable = true; references = </asset>) { color3f[] primvars:displayColor = [(0, 1, 0)]; float primvars:rough = 0.75; }
+}""")
+    materials = [found.scene["materials"][s["material"]]["params"] for s, _ in found.copies()]
+    assert sorted(m["reflectance"] for m in materials if "reflectance" in m) == [[0, 1, 0], [0, 1, 0], [1, 0, 0]]
+    assert sorted(m["roughness"] for m in materials if "roughness" in m) == [0.25, 0.75, 0.75]
+    assert len(found.scene["prototypes"]) == 2 and not [x for x in found.report.losses if x.what != "camera"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from resolvent_usd.geometry.polygons import triangulate
+from resolvent_usd.geometry.polygons import MANY, _clip, clip_ears, triangulate
 
 
 def area(p: np.ndarray) -> np.ndarray:
@@ -81,3 +81,13 @@ def test_degenerate_polygons_end() -> None:
     for p in (line, same, eight):
         triangles, _ = cut(p, [len(p)], list(range(len(p))))
         assert triangles.shape == (len(p) - 2, 3)
+
+
+@pytest.mark.parametrize("n", [4, 5, 7, 16, MANY, MANY + 1])
+def test_many_polygons_are_cut_like_each_alone(n: int) -> None:
+    """Concave ones, ones that cross themselves, and points on a coarse grid, of which some coincide."""
+    rng = np.random.default_rng(n)
+    stars = np.stack([random_star(rng, n)[:, :2] for _ in range(20)])
+    polygons = np.concatenate([stars, rng.normal(size=(20, n, 2)), rng.integers(0, 4, (20, n, 2)).astype(float)])
+    for p, triangles in zip(polygons, _clip(polygons), strict=True):
+        assert np.array_equal(triangles, clip_ears(p))

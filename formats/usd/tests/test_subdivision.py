@@ -111,10 +111,10 @@ def test_semi_sharp_crease_by_hand() -> None:
     assert np.allclose(half, 0.5 * (smooth + sharp))
     # Sharpness 1 is sharp for one level and smooth from then on.
     one = subdivide.step(cage(CUBE, FACES, loop(1), [1.0] * 4))
-    assert np.allclose(one.data, sharp) and not one.known.sharpness.any()
+    assert np.allclose(one.data, sharp) and not one.edges.sharpness.any()
     # 1.5: sharp, then half.
     two = subdivide.step(cage(CUBE, FACES, loop(1), [1.5] * 4))
-    assert np.allclose(two.data, sharp) and sorted(two.known.sharpness)[-9:] == [0] + [0.5] * 8
+    assert np.allclose(two.data, sharp) and sorted(two.edges.sharpness)[-9:] == [0] + [0.5] * 8
 
 
 def test_edges_are_those_of_the_faces() -> None:
@@ -123,8 +123,8 @@ def test_edges_are_those_of_the_faces() -> None:
     mixed = [*faces[1:], [0, 1, 5], [0, 5, 4]]
     for mesh in (cage(CUBE, FACES, loop(1), [2.5] * 4), cage(points, mixed)):
         fine = subdivide.step(subdivide.step(mesh))
-        known = fine.known
-        following = subdivide._next(fine.counts)
+        known = fine.edges
+        following = subdivide.following(fine.counts)
         ends = np.sort(np.stack([fine.indices, fine.indices[following]], axis=1), axis=1)
         assert np.array_equal(np.sort(known.ends[known.of_corner], axis=1), ends)
         assert len(np.unique(ends, axis=0)) == len(known.ends)
@@ -203,3 +203,26 @@ def test_wrong_creases_name_the_prim(convert_text) -> None:
     ):
         with pytest.raises(InputError, match="/m.*" + words):
             convert_text(MESH % extra)
+
+
+@pytest.mark.parametrize("kinds", [1, 3, 40])
+def test_corners_of_a_point_with_equal_values_are_one(kinds: int) -> None:
+    """However many different values meet at a point: by a dictionary, and by what the mesh of texture coordinates is made of."""
+    from resolvent_usd.geometry.primvars import Topology
+    from resolvent_usd.geometry.refine import _welds
+
+    rng = np.random.default_rng(kinds)
+    indices, values = rng.integers(0, 5, 600), rng.integers(0, kinds, (600, 2)).astype(np.float32)
+    first, which = _welds(Topology(5, np.full(200, 3), indices), values)
+    places: dict[tuple[int, ...], int] = {}
+    for corner, key in enumerate(zip(indices, *values.T, strict=True)):
+        places.setdefault(key, corner)
+        assert first[which[corner]] == places[key]
+    assert sorted(places.values()) == first.tolist()
+
+
+def test_loop_subdivision_is_reported(convert_text) -> None:
+    triangles = MESH.replace("[4, 4, 4, 4]", "[3, 3]").replace("[0, 1, 4, 3, 1, 2, 5, 4, 3, 4, 7, 6, 4, 5, 8, 7]", "[0, 1, 4, 0, 4, 3]")
+    found = convert_text(triangles % 'uniform token subdivisionScheme = "loop"')
+    (loss,) = [x for x in found.report.losses if x.path == "/m"]
+    assert (loss.kind, loss.what) == ("approximated", "subdivisionScheme") and "Loop" in loss.reason

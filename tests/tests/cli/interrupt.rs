@@ -4,7 +4,8 @@ use crate::program::{folder, path, picture, scene};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
-fn signal(name: &str, pid: u32) {
+/// Sends a signal to a process.
+pub fn signal(name: &str, pid: u32) {
     let status = Command::new("kill")
         .args([name, &pid.to_string()])
         .status()

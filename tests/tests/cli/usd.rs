@@ -1,8 +1,10 @@
 //! USD stages: the converter's own tests, and the program with the converter.
 
-use super::program::{folder, path, picture, repository};
+use super::interrupt::signal;
+use super::program::{bits, folder, path, picture, repository};
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 
 /// The converter's folder.
@@ -62,14 +64,21 @@ fn the_packages_own_tests() {
     assert!(out.status.success(), "{said}");
 }
 
-/// Runs the program with this Python and a cache of its own.
-fn run(folder: &Path, python: &Path, args: &[&str]) -> Output {
-    Command::new(path())
+/// The program with this Python and a cache of its own.
+fn command(folder: &Path, python: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(path());
+    command
         .args(args)
         .current_dir(folder)
         .env_remove("RESOLVENT_PLUGIN_PATH")
         .env("RESOLVENT_PYTHON", python)
-        .env("XDG_CACHE_HOME", folder.join("cache"))
+        .env("XDG_CACHE_HOME", folder.join("cache"));
+    command
+}
+
+/// Runs it.
+fn run(folder: &Path, python: &Path, args: &[&str]) -> Output {
+    command(folder, python, args)
         .output()
         .unwrap_or_else(|e| panic!("{e}"))
 }
@@ -144,11 +153,14 @@ fn rendered_through_the_cache() {
     let first = scenes();
     assert_eq!(first.len(), 1);
 
-    // The same bytes written again: found, and the losses are said again.
+    // The same bytes written again: found, and the losses are said again, in full if they are asked for.
     write("(1, 0, 0)");
-    let out = run(&folder, python(), &RENDER);
+    let args = [&RENDER[..], &["--report", "losses.json"]].concat();
+    let out = run(&folder, python(), &args);
     assert!(said(&out).contains("clippingRange"), "{}", said(&out));
     assert_eq!(scenes(), first);
+    let report = std::fs::read_to_string(folder.join("losses.json")).unwrap();
+    assert!(report.contains("clippingRange"), "{report}");
 
     write("(0, 1, 0)");
     let out = run(&folder, python(), &RENDER);
@@ -167,6 +179,90 @@ fn rendered_through_the_cache() {
     assert!(out.status.success(), "{}", said(&out));
     assert_eq!(mean(&folder), [0.0; 3]);
     assert_eq!(scenes().len(), 2);
+}
+
+/// Frame after frame, each the picture that it is alone; names have the frame's number.
+#[test]
+fn sequences_are_rendered() {
+    let folder = folder("usd_sequence");
+    std::fs::write(folder.join("shot.usda"), stage("(1, 0, 0)")).unwrap();
+    let args = |output, more: &[&'static str]| {
+        let args = ["render", "shot.usda", "-o", output, "--resolution", "24x24"];
+        [&args[..], more].concat()
+    };
+    let out = run(
+        &folder,
+        python(),
+        &args("a.####.exr", &["--spp", "4", "--frames", "0-7:3"]),
+    );
+    assert!(out.status.success(), "{}", said(&out));
+    let pictures = |name: &str| {
+        let mut found: Vec<_> = std::fs::read_dir(&folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .filter(|n| n.starts_with(name))
+            .collect();
+        found.sort();
+        found
+    };
+    assert_eq!(pictures("a."), ["a.0000.exr", "a.0003.exr", "a.0006.exr"]);
+    let alone = args("alone.exr", &["--spp", "4", "--frame", "3"]);
+    assert!(run(&folder, python(), &alone).status.success());
+    let [third, alone] = ["a.0003.exr", "alone.exr"].map(|f| bits(&picture(&folder.join(f))));
+    assert_eq!(third, alone);
+
+    // Interrupted in the second frame: the first one is there, and what is left is said.
+    let mut child = command(
+        &folder,
+        python(),
+        &args(
+            "b.exr",
+            &["--time", "1", "--threads", "1", "--frames", "0-9:3"],
+        ),
+    )
+    .stderr(Stdio::piped())
+    .spawn()
+    .unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap())
+        .lines()
+        .map_while(Result::ok);
+    assert!(lines.any(|l| l.starts_with("frame 3")));
+    assert_eq!(pictures("b."), ["b.0000.exr"]);
+    signal("-INT", child.id());
+    let rest: Vec<String> = lines.collect();
+    assert_eq!(child.wait().unwrap().code(), Some(3), "{rest:?}");
+    let left = "interrupted; 1 frames are written; for the rest: --frames 3-9:3";
+    assert_eq!(rest.last().map(String::as_str), Some(left), "{rest:?}");
+
+    // An error names the frame; an option that has no meaning for a scene is refused.
+    let broken =
+        stage("(1, 0, 0)").replace("intensity = 1", "intensity.timeSamples = { 0: 1, 3: nan }");
+    std::fs::write(folder.join("shot.usda"), broken).unwrap();
+    let out = run(
+        &folder,
+        python(),
+        &args("c.exr", &["--spp", "1", "--frames", "0-9:3"]),
+    );
+    assert_eq!(out.status.code(), Some(2), "{}", said(&out));
+    let last = said(&out).lines().last().unwrap_or_default().to_owned();
+    for words in [
+        "error: frame 3: /sun",
+        "1 frames are written; for the rest: --frames 3-9:3",
+    ] {
+        assert!(last.contains(words), "{last}");
+    }
+    assert_eq!(pictures("c."), ["c.0000.exr"]);
+    std::fs::write(folder.join("scene.json"), "{}").unwrap();
+    let out = run(
+        &folder,
+        python(),
+        &["render", "scene.json", "--frames", "1-2"],
+    );
+    assert!(
+        said(&out).contains("--frames is for USD stages"),
+        "{}",
+        said(&out)
+    );
 }
 
 #[test]

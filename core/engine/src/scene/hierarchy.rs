@@ -147,7 +147,6 @@ mod tests {
             d,
             t0: 0.0,
             t1,
-            ..bytemuck::Zeroable::zeroed()
         }
     }
 

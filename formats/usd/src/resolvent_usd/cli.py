@@ -15,6 +15,7 @@ from pathlib import Path
 
 from pxr import Ar, Sdf, Usd
 
+from . import mtlx
 from .context import Options
 from .convert import convert, open_stage
 from .report import InputError, Report
@@ -81,7 +82,7 @@ def scene_files(output: Path, frames: Sequence[float | None]) -> list[Path]:
         pattern = f"{output.stem}.####{output.suffix}"
 
     def name(frame: float) -> str:
-        whole, _, part = f"{frame:g}".partition(".")
+        whole, _, part = f"{round(frame, 6):.12g}".partition(".")
         number = lambda m: whole.zfill(len(m[0])) + ("." + part if part else "")  # noqa: E731
         return re.sub("#+", number, pattern, count=1)
 
@@ -91,6 +92,7 @@ def scene_files(output: Path, frames: Sequence[float | None]) -> list[Path]:
 def layer_hashes(stage: Usd.Stage) -> dict[str, str]:
     """BLAKE2b (16 bytes) of the files that the stage is composed of; packages count as a whole."""
     paths = {Ar.SplitPackageRelativePathOuter(layer.realPath)[0] for layer in stage.GetUsedLayers() if layer.realPath}
+    paths |= mtlx.sources(stage)
     return {path: hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest() for path in sorted(paths)}
 
 

@@ -103,7 +103,7 @@ class Context:
             raise InputError(f"{claim.path}.{attribute}", f"can't read '{resolved}'")
         inner = Path(Ar.SplitPackageRelativePathInner(resolved)[1])
         with opened:
-            return self.files.add(inner.stem, inner.suffix, bytes(opened.GetBuffer()))
+            return self.files.add(inner.stem, inner.suffix, [bytes(opened.GetBuffer())])
 
 
 def time_code(stage: Usd.Stage, frame: float | None) -> Usd.TimeCode:

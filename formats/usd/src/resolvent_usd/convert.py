@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd
+from pxr import Sdf, Tf, Usd, UsdUtils
 
-from . import converters, render_settings
+from . import converters, mtlx, render_settings
 from .context import Context, Options
 from .groups import lay_out
 from .report import InputError, Report
@@ -18,20 +21,38 @@ def open_stage(path: str, options: Options, report: Report) -> Usd.Stage:
 
     What composition could not resolve is an error, or with --keep-going in the report.
     """
-    try:
-        stage = Usd.Stage.Open(path, Usd.Stage.LoadAll)
-    except Tf.ErrorException as error:
-        first = str(error).strip().splitlines()
-        raise InputError(path, f"can't be opened as a USD stage: {first[-1].strip() if first else error}") from None
-    stage.SetEditTarget(stage.GetSessionLayer())
-    for prim_path, name, selection in options.variants:
-        _select(stage, prim_path, name, selection)
-    for broken in stage.GetCompositionErrors():
-        problem = InputError(broken.rootSite.path, " ".join(str(broken).split()))
+    with _diagnostics():
+        try:
+            stage = Usd.Stage.Open(path, Usd.Stage.LoadAll)
+        except Tf.ErrorException as error:
+            first = str(error).strip().splitlines()
+            raise InputError(path, f"can't be opened as a USD stage: {first[-1].strip() if first else error}") from None
+        stage.SetEditTarget(stage.GetSessionLayer())
+        for prim_path, name, selection in options.variants:
+            _select(stage, prim_path, name, selection)
+        problems = mtlx.compose(stage)
+    problems += [
+        InputError(broken.rootSite.path, " ".join(str(broken).split()))
+        for broken in stage.GetCompositionErrors()
+        if not mtlx.known(broken)
+    ]
+    for problem in problems:
         if not options.keep_going:
             raise problem
         report.failed(problem)
     return stage
+
+
+@contextmanager
+def _diagnostics() -> Iterator[None]:
+    """What could not be composed is ours to report; what else USD says goes to the terminal."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    finally:
+        for said in delegate.TakeUncoalescedDiagnostics():
+            if not said.sourceFunction.endswith("_ReportErrors"):
+                print(f"USD: {said.commentary}", file=sys.stderr)
 
 
 def _select(stage: Usd.Stage, prim_path: str, name: str, selection: str) -> None:

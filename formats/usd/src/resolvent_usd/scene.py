@@ -11,6 +11,7 @@ import io
 import json
 import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -38,16 +39,19 @@ class Files:
         self.folder = scene_file.with_suffix("").name + ".assets"
         self._written: set[str] = set()
 
-    def add(self, stem: str, suffix: str, content: bytes) -> str:
-        """Writes a file and returns its path relative to the scene's folder."""
-        digest = hashlib.blake2b(content, digest_size=10).hexdigest()
-        name = f"{self.folder}/{stem}-{digest}{suffix}"
+    def add(self, stem: str, suffix: str, content: Sequence[bytes | memoryview]) -> str:
+        """Writes the pieces of a file and returns its path relative to the scene's folder."""
+        digest = hashlib.blake2b(digest_size=10)
+        for piece in content:
+            digest.update(piece)
+        name = f"{self.folder}/{stem}-{digest.hexdigest()}{suffix}"
         if name not in self._written:
             path = self.base / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            if not (path.exists() and path.stat().st_size == len(content)):
+            if not (path.exists() and path.stat().st_size == sum(map(len, content))):
                 part = path.with_name(path.name + ".tmp")
-                part.write_bytes(content)
+                with part.open("wb") as out:
+                    out.writelines(content)
                 os.replace(part, path)
             self._written.add(name)
         return name
@@ -136,11 +140,11 @@ class Scene:
         return free
 
 
-def npy(array: Matrix) -> bytes:
+def npy(array: Matrix) -> Sequence[bytes | memoryview]:
     """The bytes of a NumPy file of little-endian f32, C order."""
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.ascontiguousarray(array, dtype="<f4"), version=(1, 0))
-    return buffer.getvalue()
+    data, header = np.ascontiguousarray(array, dtype="<f4"), io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(data))
+    return [header.getvalue(), data.reshape(-1).view(np.uint8).data]
 
 
 def _short_lists(text: str) -> str:

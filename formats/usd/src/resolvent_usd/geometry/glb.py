@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.floating[Any]]
 IntArray = NDArray[np.integer[Any]]
 
+Content = bytes | memoryview
+
 _F32, _U32 = 5126, 5125
 _ARRAY_BUFFER, _ELEMENT_ARRAY_BUFFER = 34962, 34963
 
@@ -47,22 +49,25 @@ def compact(t: Triangles) -> Triangles:
     return Triangles(t.positions[used], new[t.indices], pick(t.normals), pick(t.uvs), pick(t.colors))
 
 
-def write(t: Triangles) -> bytes:
-    """The bytes of the .glb file."""
-    chunks: list[bytes] = []
+def write(t: Triangles) -> list[Content]:
+    """The bytes of the .glb file, in pieces."""
+    chunks: list[Content] = []
+    size = 0
     views: list[dict[str, Any]] = []
     accessors: list[dict[str, Any]] = []
 
     def add(array: NDArray[Any], kind: str, component: int, target: int, bounds: bool = False) -> int:
+        nonlocal size
         data = np.ascontiguousarray(array, dtype="<u4" if component == _U32 else "<f4")
-        views.append({"buffer": 0, "byteOffset": sum(map(len, chunks)), "byteLength": data.nbytes, "target": target})
+        views.append({"buffer": 0, "byteOffset": size, "byteLength": data.nbytes, "target": target})
+        size += data.nbytes
         accessor: dict[str, Any] = {
             "bufferView": len(views) - 1, "componentType": component, "count": len(data), "type": kind,
         }  # fmt: skip
         if bounds:
-            accessor["min"], accessor["max"] = data.min(axis=0).tolist(), data.max(axis=0).tolist()
+            accessor["min"], accessor["max"] = (_along_rows(f, data).tolist() for f in (np.minimum, np.maximum))
         accessors.append(accessor)
-        chunks.append(data.tobytes())
+        chunks.append(data.reshape(-1).view(np.uint8).data)
         return len(accessors) - 1
 
     attributes = {"POSITION": add(t.positions, "VEC3", _F32, _ARRAY_BUFFER, bounds=True)}
@@ -70,12 +75,12 @@ def write(t: Triangles) -> bytes:
         attributes["NORMAL"] = add(t.normals, "VEC3", _F32, _ARRAY_BUFFER)
     if t.uvs is not None:
         # glTF's v points down.
-        flipped = np.stack([t.uvs[:, 0], 1.0 - t.uvs[:, 1].astype(float)], axis=1)
+        flipped = np.array(t.uvs, dtype="<f4")
+        flipped[:, 1] = 1.0 - t.uvs[:, 1].astype(float)
         attributes["TEXCOORD_0"] = add(flipped, "VEC2", _F32, _ARRAY_BUFFER)
     if t.colors is not None:
         attributes["COLOR_0"] = add(t.colors, "VEC4", _F32, _ARRAY_BUFFER)
     indices = add(t.indices.reshape(-1), "SCALAR", _U32, _ELEMENT_ARRAY_BUFFER)
-    binary = b"".join(chunks)
     root = {
         "asset": {"version": "2.0", "generator": "resolvent_usd"},
         "scene": 0,
@@ -84,11 +89,20 @@ def write(t: Triangles) -> bytes:
         "meshes": [{"primitives": [{"attributes": attributes, "indices": indices}]}],
         "accessors": accessors,
         "bufferViews": views,
-        "buffers": [{"byteLength": len(binary)}],
+        "buffers": [{"byteLength": size}],
     }
     text = json.dumps(root, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
-    total = 12 + 8 + len(text) + 8 + len(binary)
+    total = 12 + 8 + len(text) + 8 + size
     header = struct.pack("<4sII", b"glTF", 2, total)
     json_chunk = struct.pack("<I4s", len(text), b"JSON") + text
-    return header + json_chunk + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return [header + json_chunk + struct.pack("<I4s", size, b"BIN\0"), *chunks]
+
+
+def _along_rows(f: np.ufunc, data: NDArray[Any]) -> NDArray[Any]:
+    """Reduction of (n, k) rows to one: of long rows first, which is many times faster."""
+    whole = len(data) // 1024 * 1024
+    parts = [data[whole:]]
+    if whole:
+        parts.append(f.reduce(data[:whole].reshape(-1, 1024 * data.shape[1]), axis=0).reshape(1024, -1))
+    return np.asarray(f.reduce(np.concatenate(parts), axis=0))

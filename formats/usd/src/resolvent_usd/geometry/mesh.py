@@ -14,7 +14,7 @@ from ..context import Context, Look
 from ..registry import converts
 from ..report import InputError
 from . import primvars
-from .glb import compact, write
+from .glb import write
 from .looks import look_of
 from .primvars import Primvar, Topology
 from .refine import Surface, refine
@@ -39,6 +39,7 @@ def mesh(ctx: Context, claim: Claim) -> None:
     """Converts a mesh: one glTF shape for each material."""
     no_motion(claim)
     claim.take("doubleSided")  # A hint: surfaces are seen from both sides.
+    claim.take_prefix("subsetFamily:")  # Says how subsets are meant to be disjoint; those that are not are reported.
     topology = _topology(claim)
     points = claim.array("points", np.float32, 3)
     if points is None or not len(topology.counts):
@@ -160,7 +161,7 @@ def emit(ctx: Context, claim: Claim, surface: Surface, look: Look, faces: Ints |
     if len(triangles.indices) == 0:
         return
     stem = "".join(c if c.isalnum() else "_" for c in claim.prim.GetName())[:40]
-    file = ctx.files.add(stem, ".glb", write(compact(triangles)))
+    file = ctx.files.add(stem, ".glb", write(triangles))
     claim.group.add({"type": "gltf", "file": file, **look.shape}, claim.matrix)
 
 

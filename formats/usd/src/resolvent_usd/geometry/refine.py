@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from ..claim import Claim
 from ..context import Context
 from . import primvars, subdivide
-from .glb import Triangles
+from .glb import Triangles, compact
 from .polygons import triangulate
 from .primvars import Primvar, Topology
 
 Array = NDArray[Any]
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
+
+PART = 1 << 16
+"""Elements that are worked on at once where that spares memory's bandwidth."""
 
 
 @dataclass
@@ -83,51 +86,90 @@ def _welded(
     uv: tuple[Array, Ints] | None,
     colors: tuple[Array, Ints] | None,
 ) -> Triangles:
-    """Corners that agree in everything become one vertex."""
-    shared = [_shared(*a, indices, len(points)) for a in (normals, uv, colors) if a is not None]
-    apart = [which for which in shared if which is not None]
-    if not apart:
-        # Everything hangs on the point.
-        first = np.zeros(len(points), dtype=np.int64)
-        first[indices[::-1]] = np.arange(len(indices))[::-1]
+    """Corners of a point that have in everything what its first corner has become one vertex with it."""
+    attributes = (normals, uv, colors)
+    apart = [a for a in attributes if a is not None and a[1] is not indices]
+    if apart:
+        first = _first_corners(indices, len(points))
+        shared = _shared(apart, indices, first)
+        if shared is not None:
+            source, vertex = shared
+            if len(source) == len(indices):
+                return compact(Triangles(points.take(indices, axis=0), corners, *map(_whole, attributes)))
+            place = points.take(indices.take(source), axis=0)
+            return compact(Triangles(place, vertex.take(corners), *(_taken(a, source) for a in attributes)))
 
-        def per_point(a: tuple[Array, Ints] | None) -> Array | None:
-            return None if a is None else a[0][a[1][first]]
+    # Everything hangs on the point.
+    def per_point(a: tuple[Array, Ints] | None) -> Array | None:
+        if a is None or a[1] is indices:
+            return None if a is None else a[0]
+        return a[0].take(a[1].take(first), axis=0)
 
-        return Triangles(points, indices[corners], per_point(normals), per_point(uv), per_point(colors))
-    flat = corners.reshape(-1)
-    key = indices[flat]
-    for which in apart:
-        key = _dense(key) * (int(which.max()) + 1) + which[flat]
-    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
-    source = flat[first]
-
-    def pick(a: tuple[Array, Ints] | None) -> Array | None:
-        return None if a is None else a[0][a[1][source]]
-
-    return Triangles(points[indices[source]], inverse.reshape(-1, 3), pick(normals), pick(uv), pick(colors))
+    return compact(Triangles(points, indices.take(corners), *(per_point(a) for a in attributes)))
 
 
-def _dense(key: Ints) -> Ints:
-    """The same keys as small numbers, if they are large enough to overflow the next product."""
-    if len(key) and int(key.max()) > 1 << 31:
-        return np.asarray(np.unique(key, return_inverse=True)[1].reshape(-1))
-    return key
+def _taken(a: tuple[Array, Ints] | None, corners: Ints) -> Array | None:
+    """The values at some corners."""
+    return None if a is None else a[0].take(a[1].take(corners), axis=0)
 
 
-def _shared(values: Array, which: Ints, indices: Ints, size: int) -> Ints | None:
-    """The same values, corners with that of their point's first corner referring to it; None if all have it."""
-    if which is indices:
-        return None
+def _whole(a: tuple[Array, Ints] | None) -> Array | None:
+    """The values at all corners."""
+    if a is None or _one_each(a[1]):
+        return None if a is None else a[0]
+    return a[0].take(a[1], axis=0)
+
+
+def _first_corners(indices: Ints, size: int) -> Ints:
+    """For each point its first corner (0 for those without)."""
     first = np.zeros(size, dtype=np.int64)
-    first[indices[::-1]] = which[::-1]
-    other = first[indices]
-    differ = np.flatnonzero(other != which)
-    own = differ[(values[other[differ]] != values[which[differ]]).any(axis=1)]
-    if len(own) == 0:
+    first[indices[::-1]] = np.arange(len(indices) - 1, -1, -1)
+    return first
+
+
+def _shared(attributes: list[tuple[Array, Ints]], indices: Ints, first: Ints) -> tuple[Ints, Ints] | None:
+    """Vertices, in the order of their first corners: those corners, and for each corner its vertex. None if points are enough."""
+    leader = first.take(indices)
+    different = [_differ(values, which, which.take(leader)) for values, which in attributes]
+    own = np.logical_or.reduce(different)
+    if not own.any():
         return None
-    other[own] = which[own]
-    return other
+    alone = np.zeros(len(indices), dtype=bool)
+    for (_, which), differs in zip(attributes, different, strict=True):
+        if _one_each(which):
+            alone |= differs
+    leads = leader.copy()
+    leads[own] = np.flatnonzero(own)
+    # Others that differ from the first may be alike: where all that they have was given to several corners by one number.
+    if len(rest := np.flatnonzero(own & ~alone)):
+        key = indices[rest]
+        for (_, which), differs in zip(attributes, different, strict=True):
+            numbers = np.where(differs[rest], which[rest], which[leader[rest]])
+            key = np.unique(key, return_inverse=True)[1] * (int(which.max()) + 1) + numbers
+        _, least, group = np.unique(key, return_index=True, return_inverse=True)
+        leads[rest] = rest[least][group]
+    return _numbered(leads)
+
+
+def _numbered(leads: Ints) -> tuple[Ints, Ints]:
+    """Of corners that each have a leading one: those that lead, and for each corner the number of its own."""
+    leading = np.zeros(len(leads), dtype=bool)
+    leading[leads] = True
+    return np.flatnonzero(leading), (np.cumsum(leading) - 1).take(leads)
+
+
+def _one_each(which: Ints) -> bool:
+    """True if every corner has a value of its own."""
+    return len(which) > 0 and int(which[-1]) == len(which) - 1 and np.array_equal(which, np.arange(len(which)))
+
+
+def _differ(values: Array, a: Ints, b: Ints) -> NDArray[np.bool_]:
+    """True where rows a and b of the values differ."""
+    out: NDArray[np.bool_] = a != b
+    at = np.flatnonzero(out)
+    other = values.take(a.take(at), axis=0) != values.take(b.take(at), axis=0)
+    out[at] = other[:, 0] if other.shape[1] == 1 else np.logical_or.reduce(list(other.T))
+    return out
 
 
 def refine(
@@ -163,12 +205,12 @@ def refine(
     if smooth:
         cage = subdivide.limit(cage)
     surface = Surface(
-        cage.data.astype(np.float32), cage.counts, cage.indices, cage.face, shown[cage.face], flipped,
+        _single(cage.data), cage.counts, cage.indices, cage.face, shown[cage.face], flipped,
         None, lambda name, width: _subdivided_data(claim, name, width, topology, rules, level, smooth),
     )  # fmt: skip
     if smooth:
         values, which = subdivide.smooth_normals(cage, cage.data)
-        surface.normals = (-values if flipped else values).astype(np.float32), which
+        surface.normals = _single(-values if flipped else values), which
     return surface
 
 
@@ -237,6 +279,11 @@ class _Rules:
         )  # fmt: skip
 
 
+def _single(values: Array) -> Array:
+    """In single precision, row by row."""
+    return np.ascontiguousarray(values, dtype=np.float32)
+
+
 def _touches_boundary(topology: Topology) -> NDArray[np.bool_]:
     """Faces that the boundary rule "none" leaves out: those with a vertex on a boundary."""
     cage = subdivide.Cage(
@@ -245,7 +292,7 @@ def _touches_boundary(topology: Topology) -> NDArray[np.bool_]:
     )  # fmt: skip
     of_corner, sharp = subdivide.sharp_edges(cage)
     on_boundary = np.zeros(topology.points, dtype=bool)
-    following = subdivide._next(topology.counts)
+    following = subdivide.following(topology.counts)
     edge = sharp[of_corner]
     on_boundary[topology.indices[edge]] = True
     on_boundary[topology.indices[following[edge]]] = True
@@ -254,9 +301,16 @@ def _touches_boundary(topology: Topology) -> NDArray[np.bool_]:
 
 
 def _unit(a: tuple[Array, Ints]) -> tuple[Array, Ints]:
-    values = np.asarray(a[0], dtype=np.float64)
-    length = np.linalg.norm(values, axis=1, keepdims=True)
-    return np.where(length > 0, values / np.maximum(length, 1e-300), [0.0, 0.0, 1.0]).astype(np.float32), a[1]
+    out = np.empty(a[0].shape, dtype=np.float32)
+    # Parts that stay in the cache.
+    for start in range(0, len(out), PART):
+        x, y, z = np.asarray(a[0][start : start + PART], dtype=float).T
+        length = np.sqrt((x * x + y * y) + z * z)
+        flat = length == 0.0
+        length[flat] = 1.0
+        for k, column in enumerate((x, y, np.where(flat, 1.0, z))):
+            out[start : start + PART, k] = column / length
+    return out, a[1]
 
 
 def _flat(primvar: Primvar, topology: Topology) -> tuple[Array, Ints]:
@@ -307,26 +361,41 @@ def _subdivided_data(
     elif found.interpolation == "faceVarying" and smooth and rules.face_varying != "all":
         cage = _face_varying_cage(topology, values, rules)
     else:
-        linear = rules.cage(topology, np.zeros((topology.points, 0)))
-        cage = subdivide.Cage(**{**linear.__dict__, "corner": np.asarray(values[which], dtype=float)})
+        counts, corners = topology.counts, np.ascontiguousarray(values[which].T, dtype=float)
         for _ in range(level):
-            cage = subdivide.step(cage, smooth=False)
-        assert cage.corner is not None
-        return cage.corner.astype(np.float32), np.arange(len(cage.corner))
+            corners, counts = subdivide.linear(counts, corners), np.full(corners.shape[1], 4)
+        return _single(corners.T), np.arange(corners.shape[1])
     for _ in range(level):
         cage = subdivide.step(cage)
     cage = subdivide.limit(cage)
-    return cage.data.astype(np.float32), cage.indices
+    return _single(cage.data), cage.indices
+
+
+def _welds(topology: Topology, values: Array) -> tuple[Ints, Ints]:
+    """Corners of a point with equal values are one: the first corners, and for each corner the number of its own."""
+    indices = topology.indices
+    leads, rest = np.arange(len(indices)), np.arange(len(indices))
+    # Most have what the first one has, or the first of those that have not.
+    for _ in range(8):
+        here = indices.take(rest)
+        leader = rest.take(_first_corners(here, topology.points).take(here))
+        differs = _differ(values, rest, leader)
+        leads[rest] = leader
+        rest = rest[differs]
+        if len(rest) == 0:
+            break
+    else:
+        rest = rest[np.lexsort((*values[rest].T, indices[rest]))]
+        new = np.ones(len(rest), dtype=bool)
+        new[1:] = _differ(values, rest[1:], rest[:-1]) | (indices[rest[1:]] != indices[rest[:-1]])
+        leads[rest] = rest[new][np.cumsum(new) - 1]
+    return _numbered(leads)
 
 
 def _face_varying_cage(topology: Topology, values: Array, rules: _Rules) -> subdivide.Cage:
     """The mesh of the texture coordinates: points split where neighbouring faces disagree, seams are its boundaries."""
-    _, value = np.unique(values, axis=0, return_inverse=True)
-    keys, first, inverse = np.unique(
-        topology.indices * (int(value.max()) + 1) + value.reshape(-1), return_index=True, return_inverse=True
-    )
-    inverse = inverse.reshape(-1)
-    size = len(keys)
+    first, inverse = _welds(topology, values)
+    size = len(first)
     point = topology.indices[first]
     # Creases of the mesh hold where the coordinates are continuous: both of an edge's sides have the same two values.
     corner = np.zeros(size)
@@ -343,7 +412,7 @@ def _face_varying_cage(topology: Topology, values: Array, rules: _Rules) -> subd
     if rules.face_varying == "boundaries":
         # All seams and boundaries are linear.
         of_corner, sharp = subdivide.sharp_edges(cage)
-        following = subdivide._next(topology.counts)
+        following = subdivide.following(topology.counts)
         seam = sharp[of_corner]
         corner[inverse[seam]] = subdivide.INFINITE
         corner[inverse[following[seam]]] = subdivide.INFINITE

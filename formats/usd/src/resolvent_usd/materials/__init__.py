@@ -52,7 +52,7 @@ def _look(ctx: Context, claim: Claim, material: UsdShade.Material, subset: Claim
         ctx.report.skipped(path, "outputs:surface", f"has {what}", "surfaces look as if no material were bound")
         cache[path] = None
         return None
-    builder = Builder(ctx, claim)
+    builder = Builder(ctx, claim, material.GetPrim(), subset)
     look = surfaces.convert(builder, found[0], str(material.GetPrim().GetName()))
     _displacement(ctx, material)
     if not builder.of_the_prim:

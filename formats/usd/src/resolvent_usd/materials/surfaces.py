@@ -6,6 +6,8 @@ What has no counterpart there is reported where it is authored with an effect.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -194,108 +196,137 @@ def _preview_opacity(s: _Surface) -> None:
         )
 
 
-def _standard_surface(s: _Surface) -> Look:
-    """Autodesk Standard Surface 1.0.1."""
-    s.set("base_color", s.product("base", "base_color", 1.0, 0.8), number=False)
-    _reflection(s, "metalness", "specular")
-    roughness = s.read("diffuse_roughness", 0.0)
-    s.set("diffuse_roughness", roughness, 0.0)
-    if not roughness.is_just(0.0):
-        s.node.claim.approximated("inputs:diffuse_roughness", "principled has OpenPBR's rough diffuse", "not Oren and Nayar's")
-    s.set("roughness", s.read("specular_roughness", 0.2), 0.5)
-    s.set("ior", _constant(s, "specular_IOR", 1.5), 1.5, 1.0, 5.0)
-    s.set("anisotropy", s.read("specular_anisotropy", 0.0), 0.0)
-    transmission = s.read("transmission", 0.0)
-    s.set("transmission", transmission, 0.0)
-    if not transmission.is_just(0.0):
-        s.set("transmission_color", s.read("transmission_color", 1.0), None, number=False)
-        s.without(
-            {"transmission_depth": 0.0, "transmission_scatter": 0.0, "transmission_dispersion": 0.0, "transmission_extra_roughness": 0.0},
-            "the colour is met at the surface, the inside is clear",
-        )
-        s.ignore("transmission_scatter_anisotropy")
-    else:
-        s.ignore("transmission_color", "transmission_depth", "transmission_scatter", "transmission_scatter_anisotropy")
-        s.ignore("transmission_dispersion", "transmission_extra_roughness")
-    _subsurface(s, "subsurface", ("subsurface_color", "subsurface_radius", "subsurface_scale", "subsurface_anisotropy"))
-    sheen = s.read("sheen", 0.0)
-    s.set("sheen", sheen, 0.0)
-    if not sheen.is_just(0.0):
-        s.set("sheen_color", s.read("sheen_color", 1.0), 1.0, number=False)
-        s.set("sheen_roughness", s.read("sheen_roughness", 0.3), 0.3)
-    else:
-        s.ignore("sheen_color", "sheen_roughness")
-    coat = s.read("coat", 0.0)
-    s.set("clearcoat", coat, 0.0)
-    if not coat.is_just(0.0):
-        s.set("clearcoat_roughness", s.read("coat_roughness", 0.1), 0.0)
-        s.set("clearcoat_ior", _constant(s, "coat_IOR", 1.5), 1.5, 1.0, 3.0)
-        s.set("clearcoat_color", s.read("coat_color", 1.0), 1.0, number=False)
-        s.without(
-            {"coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0, "coat_normal": _NORMAL_UP},
-            "the coat is even",
-        )
-        s.ignore("coat_rotation")
-    else:
-        s.ignore("coat_color", "coat_roughness", "coat_IOR", "coat_anisotropy", "coat_rotation", "coat_normal")
-        s.ignore("coat_affect_color", "coat_affect_roughness")
-    s.without({"thin_film_thickness": 0.0}, "the surface does not iridesce")
-    s.without({"specular_rotation": 0.0, "tangent": (1.0, 0.0, 0.0)}, "highlights stretch across x")
-    s.ignore("thin_film_IOR")
-    if bool(s.node.value("thin_walled", False)):
-        s.params["thin"] = True
-    s.opacity = s.read("opacity", 1.0)
-    s.emission = s.product("emission", "emission_color", 0.0, 1.0)
-    s.read_normal("normal")
-    return s.look()
+@dataclass(frozen=True)
+class _Names:
+    """What a layered shader calls the inputs that standard_surface and OpenPBR have both, and its defaults where theirs differ."""
+
+    base: str
+    metalness: str
+    specular: str
+    diffuse_roughness: str
+    roughness: float
+    ior: str
+    anisotropy: str
+    transmission: str
+    depth: tuple[str, ...]
+    """Of the inside of what transmits; without effect at 0."""
+    inside: tuple[str, ...]
+    """What only matters with them."""
+    subsurface: str
+    subsurface_rest: tuple[str, ...]
+    sheen: str
+    sheen_color: str
+    sheen_roughness: tuple[str, float]
+    coat: str
+    coat_roughness: float
+    coat_ior: tuple[str, float]
+    coat_darkening: str | None
+    coat_uneven: dict[str, Any]
+    """Of the coat's shape, with the values that make it even."""
+    coat_rest: tuple[str, ...]
+    film: str
+    film_rest: tuple[str, ...]
+    tangents: dict[str, Any]
+    thin: str
+    opacity: str
+    emission: str
+    normal: str
 
 
-def _open_pbr(s: _Surface) -> Look:
-    """OpenPBR Surface 1.1."""
-    s.set("base_color", s.product("base_weight", "base_color", 1.0, 0.8), number=False)
-    _reflection(s, "base_metalness", "specular_weight")
-    s.set("diffuse_roughness", s.read("base_diffuse_roughness", 0.0), 0.0)
-    s.set("roughness", s.read("specular_roughness", 0.3), 0.5)
-    s.set("ior", _constant(s, "specular_ior", 1.5), 1.5, 1.0, 5.0)
-    s.set("anisotropy", s.read("specular_roughness_anisotropy", 0.0), 0.0)
-    transmission = s.read("transmission_weight", 0.0)
-    s.set("transmission", transmission, 0.0)
-    inner = ("transmission_depth", "transmission_scatter", "transmission_dispersion_scale")
-    if not transmission.is_just(0.0):
-        s.set("transmission_color", s.read("transmission_color", 1.0), None, number=False)
-        s.without(dict.fromkeys(inner, 0.0), "the colour is met at the surface, the inside is clear")
-    else:
-        s.ignore("transmission_color", *inner)
-    s.ignore("transmission_scatter_anisotropy", "transmission_dispersion_abbe_number")
-    names = ("subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy")
-    _subsurface(s, "subsurface_weight", names)
-    fuzz = s.read("fuzz_weight", 0.0)
-    s.set("sheen", fuzz, 0.0)
-    if not fuzz.is_just(0.0):
-        s.set("sheen_color", s.read("fuzz_color", 1.0), 1.0, number=False)
-        s.set("sheen_roughness", s.read("fuzz_roughness", 0.5), 0.3)
-    else:
-        s.ignore("fuzz_color", "fuzz_roughness")
-    coat = s.read("coat_weight", 0.0)
-    s.set("clearcoat", coat, 0.0)
-    if not coat.is_just(0.0):
-        s.set("clearcoat_roughness", s.read("coat_roughness", 0.0), 0.0)
-        s.set("clearcoat_ior", _constant(s, "coat_ior", 1.6), 1.5, 1.0, 3.0)
-        s.set("clearcoat_color", s.read("coat_color", 1.0), 1.0, number=False)
-        s.set("clearcoat_darkening", s.read("coat_darkening", 1.0), 0.0)
-        s.without({"coat_roughness_anisotropy": 0.0, "geometry_coat_normal": _NORMAL_UP}, "the coat is even")
-    else:
-        s.ignore("coat_color", "coat_roughness", "coat_ior", "coat_roughness_anisotropy", "coat_darkening", "geometry_coat_normal")
-    s.without({"thin_film_weight": 0.0}, "the surface does not iridesce")
-    s.without({"geometry_tangent": (1.0, 0.0, 0.0), "geometry_coat_tangent": (1.0, 0.0, 0.0)}, "highlights stretch across x")
-    s.ignore("thin_film_thickness", "thin_film_ior")
-    if bool(s.node.value("geometry_thin_walled", False)):
-        s.params["thin"] = True
-    s.opacity = s.read("geometry_opacity", 1.0)
+_X = (1.0, 0.0, 0.0)
+STANDARD_SURFACE = _Names(
+    base="base", metalness="metalness", specular="specular", diffuse_roughness="diffuse_roughness", roughness=0.2, ior="specular_IOR",
+    anisotropy="specular_anisotropy", transmission="transmission",
+    depth=("transmission_depth", "transmission_scatter", "transmission_dispersion", "transmission_extra_roughness"),
+    inside=("transmission_scatter_anisotropy",), subsurface="subsurface",
+    subsurface_rest=("subsurface_color", "subsurface_radius", "subsurface_scale", "subsurface_anisotropy"),
+    sheen="sheen", sheen_color="sheen_color", sheen_roughness=("sheen_roughness", 0.3),
+    coat="coat", coat_roughness=0.1, coat_ior=("coat_IOR", 1.5), coat_darkening=None,
+    coat_uneven={"coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0, "coat_normal": _NORMAL_UP},
+    coat_rest=("coat_rotation",), film="thin_film_thickness", film_rest=("thin_film_IOR",),
+    tangents={"specular_rotation": 0.0, "tangent": _X},
+    thin="thin_walled", opacity="opacity", emission="emission", normal="normal",
+)  # fmt: skip
+"""Autodesk Standard Surface 1.0.1."""
+
+OPEN_PBR = _Names(
+    base="base_weight", metalness="base_metalness", specular="specular_weight", diffuse_roughness="base_diffuse_roughness", roughness=0.3,
+    ior="specular_ior", anisotropy="specular_roughness_anisotropy", transmission="transmission_weight",
+    depth=("transmission_depth", "transmission_scatter", "transmission_dispersion_scale"),
+    inside=("transmission_scatter_anisotropy", "transmission_dispersion_abbe_number"), subsurface="subsurface_weight",
+    subsurface_rest=("subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy"),
+    sheen="fuzz_weight", sheen_color="fuzz_color", sheen_roughness=("fuzz_roughness", 0.5),
+    coat="coat_weight", coat_roughness=0.0, coat_ior=("coat_ior", 1.6), coat_darkening="coat_darkening",
+    coat_uneven={"coat_roughness_anisotropy": 0.0, "geometry_coat_normal": _NORMAL_UP},
+    coat_rest=(), film="thin_film_weight", film_rest=("thin_film_thickness", "thin_film_ior"),
+    tangents={"geometry_tangent": _X, "geometry_coat_tangent": _X},
     # A luminance in nits; 1 shows as 1, as with lights.
-    s.emission = s.product("emission_luminance", "emission_color", 0.0, 1.0)
-    s.read_normal("geometry_normal")
+    thin="geometry_thin_walled", opacity="geometry_opacity", emission="emission_luminance", normal="geometry_normal",
+)  # fmt: skip
+"""OpenPBR Surface 1.1."""
+
+
+def _layered(s: _Surface, names: _Names) -> Look:
+    s.set("base_color", s.product(names.base, "base_color", 1.0, 0.8), number=False)
+    _reflection(s, names.metalness, names.specular)
+    roughness = s.read(names.diffuse_roughness, 0.0)
+    s.set("diffuse_roughness", roughness, 0.0)
+    if names is STANDARD_SURFACE and not roughness.is_just(0.0):
+        s.node.claim.approximated(f"inputs:{names.diffuse_roughness}", "principled has OpenPBR's rough diffuse", "not Oren and Nayar's")
+    s.set("roughness", s.read("specular_roughness", names.roughness), 0.5)
+    s.set("ior", _constant(s, names.ior, 1.5), 1.5, 1.0, 5.0)
+    s.set("anisotropy", s.read(names.anisotropy, 0.0), 0.0)
+    _transmission(s, names)
+    _subsurface(s, names.subsurface, names.subsurface_rest)
+    _sheen(s, names)
+    _coat(s, names)
+    s.without({names.film: 0.0}, "the surface does not iridesce")
+    s.without(names.tangents, "highlights stretch across x")
+    s.ignore(*names.film_rest)
+    if bool(s.node.value(names.thin, False)):
+        s.params["thin"] = True
+    s.opacity = s.read(names.opacity, 1.0)
+    s.emission = s.product(names.emission, "emission_color", 0.0, 1.0)
+    s.read_normal(names.normal)
     return s.look()
+
+
+def _transmission(s: _Surface, names: _Names) -> None:
+    transmission = s.read(names.transmission, 0.0)
+    s.set("transmission", transmission, 0.0)
+    s.ignore(*names.inside)
+    if transmission.is_just(0.0):
+        s.ignore("transmission_color", *names.depth)
+        return
+    s.set("transmission_color", s.read("transmission_color", 1.0), None, number=False)
+    s.without(dict.fromkeys(names.depth, 0.0), "the colour is met at the surface, the inside is clear")
+
+
+def _sheen(s: _Surface, names: _Names) -> None:
+    sheen = s.read(names.sheen, 0.0)
+    s.set("sheen", sheen, 0.0)
+    if sheen.is_just(0.0):
+        s.ignore(names.sheen_color, names.sheen_roughness[0])
+        return
+    s.set("sheen_color", s.read(names.sheen_color, 1.0), 1.0, number=False)
+    s.set("sheen_roughness", s.read(*names.sheen_roughness), 0.3)
+
+
+def _coat(s: _Surface, names: _Names) -> None:
+    coat = s.read(names.coat, 0.0)
+    s.set("clearcoat", coat, 0.0)
+    s.ignore(*names.coat_rest)
+    if coat.is_just(0.0):
+        s.ignore("coat_color", "coat_roughness", names.coat_ior[0], *names.coat_uneven)
+        if names.coat_darkening:
+            s.ignore(names.coat_darkening)
+        return
+    s.set("clearcoat_roughness", s.read("coat_roughness", names.coat_roughness), 0.0)
+    s.set("clearcoat_ior", _constant(s, *names.coat_ior), 1.5, 1.0, 3.0)
+    s.set("clearcoat_color", s.read("coat_color", 1.0), 1.0, number=False)
+    if names.coat_darkening:
+        s.set("clearcoat_darkening", s.read(names.coat_darkening, 1.0), 0.0)
+    s.without(names.coat_uneven, "the coat is even")
 
 
 def _reflection(s: _Surface, metalness: str, weight: str) -> None:
@@ -329,6 +360,6 @@ def _subsurface(s: _Surface, weight: str, names: tuple[str, ...]) -> None:
 
 _SHADERS: dict[str, Callable[[_Surface], Look]] = {
     "UsdPreviewSurface": _preview,
-    "standard_surface": _standard_surface,
-    "open_pbr_surface": _open_pbr,
+    "standard_surface": partial(_layered, names=STANDARD_SURFACE),
+    "open_pbr_surface": partial(_layered, names=OPEN_PBR),
 }

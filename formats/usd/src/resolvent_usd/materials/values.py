@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Ar, Sdf, UsdGeom
+from pxr import Ar, Sdf, Usd, UsdGeom
 
 from ..report import InputError
 from ..scene import Json
@@ -68,9 +68,11 @@ def three(value: Any) -> Array:
 class Builder:
     """Reads the inputs of one material for one prim."""
 
-    def __init__(self, ctx: Context, claim: Claim) -> None:
+    def __init__(self, ctx: Context, claim: Claim, material: Usd.Prim, subset: Claim | None = None) -> None:
         self.ctx = ctx
         self.claim = claim
+        self.material = material
+        self.subset = subset
         self.uv: str | None = None
         """The primvar that textures are read at."""
         self.of_the_prim = False
@@ -114,6 +116,11 @@ class Builder:
                 return None
             a, b = (b, a) if a.is_constant else (a, b)
             return a.times(b.constant) if kind == "multiply" else a.plus(b.constant)
+        if kind in ("combine2", "combine3", "combine4"):
+            parts = [self._inner(node, f"in{i}", 0.0, depth) for i in range(1, int(kind[-1]) + 1)]
+            if any(part is None or not part.is_constant for part in parts):
+                return None
+            return Value(np.array([*(part.number for part in parts if part is not None), 0.0])[:3])
         if kind in ("extract", "separate3", "separate4", "separate2"):
             inner = self._inner(node, "in", 0.0, depth)
             if inner is None:
@@ -276,9 +283,9 @@ class Builder:
         self.of_the_prim = True
         name = str(node.value("varname") or node.value("geomprop") or ("displayColor" if kind == "geomcolor" else ""))
         fallback = node.value("fallback", node.value("default", 0.0))
-        primvar = UsdGeom.PrimvarsAPI(self.claim.prim).FindPrimvarWithInheritance(name)
+        primvar = self._found(name)
         value = primvar.ComputeFlattened(self.ctx.time) if primvar else None
-        if value is None:
+        if primvar is None or value is None:
             return Value(three(fallback))
         self.ctx.used.add((str(primvar.GetAttr().GetPrimPath()), primvar.GetName()))
         self.ctx.used.add((str(primvar.GetAttr().GetPrimPath()), primvar.GetName() + ":indices"))
@@ -294,6 +301,15 @@ class Builder:
                 f"primvars:{name}", f"the material {node.path} reads it, and it varies over the surface", "its mean is shown"
             )
         return Value(three(array.mean(axis=0)))
+
+    def _found(self, name: str) -> UsdGeom.Primvar | None:
+        """A primvar of the subset, else of the prim or those above it, else the one that the material brings along."""
+        if self.subset is not None and (own := UsdGeom.PrimvarsAPI(self.subset.prim).GetPrimvar(name)) and own.HasAuthoredValue():
+            return own
+        if (found := UsdGeom.PrimvarsAPI(self.claim.prim).FindPrimvarWithInheritance(name)) and found.HasValue():
+            return found
+        brought = UsdGeom.PrimvarsAPI(self.material).GetPrimvar(name)
+        return brought if brought and brought.HasAuthoredValue() else None
 
     # To the scene
 
