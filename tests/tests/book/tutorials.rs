@@ -119,22 +119,34 @@ impl Reader {
         format!("docs/{}:{}", self.page, block.line)
     }
 
-    /// Runs commands. All projects share what cargo builds, so `resolvent-api` is compiled once.
+    /// Runs commands, in several parts if they change the folder.
     fn run(&mut self, block: &Block) {
+        self.said.clear();
+        let mut part = String::new();
+        let mut lines = block.text.lines().peekable();
+        while let Some(line) = lines.next() {
+            part += &format!("{line}\n");
+            let last = lines.peek().is_none();
+            if last || line.starts_with("cd ") {
+                let fails = last && block.note == "fails";
+                self.shell(&self.at(block), &std::mem::take(&mut part), fails);
+            }
+        }
+    }
+
+    /// Runs commands in the folder that earlier ones changed to. All projects share what cargo builds, so `resolvent-api` is compiled
+    /// once.
+    fn shell(&mut self, at: &str, commands: &str, fails: bool) {
         let target = self.folder.join("target");
         if self.folder.join("Cargo.toml").exists() && !target.exists() {
             std::os::unix::fs::symlink(kept("target"), &target).unwrap_or_else(|e| panic!("{e}"));
         }
-        let (there, path) = (self.bin.join("folder"), std::env::var("PATH"));
+        let there = self.bin.join("folder");
+        let path = std::env::var("PATH").unwrap_or_default();
         let mut shell = Command::new("sh");
         shell.args(["-e", "-c"]);
-        shell.arg(format!(
-            "{}pwd > {:?}",
-            block.text,
-            there.display().to_string()
-        ));
-        let path = format!("{}:{}", self.bin.display(), path.unwrap_or_default());
-        shell.current_dir(&self.folder).env("PATH", path);
+        shell.arg(format!("{commands}pwd > {:?}", there.display().to_string()));
+        shell.env("PATH", format!("{}:{path}", self.bin.display()));
         // What cargo told this test is not meant for the one it runs.
         for (name, _) in std::env::vars().filter(|(n, _)| n.starts_with("CARGO_")) {
             if name != "CARGO_HOME" {
@@ -143,19 +155,11 @@ impl Reader {
         }
         offline(&mut shell);
         let start = Instant::now();
-        let out = run(&mut shell);
-        let seconds = start.elapsed().as_secs_f64();
-        println!("{}: {seconds:.1} s\n{}", self.at(block), block.text);
-        self.said = said(&out);
-        let fails = block.note == "fails";
-        assert_eq!(
-            out.status.success(),
-            !fails,
-            "{}:\n{}\n{}",
-            self.at(block),
-            block.text,
-            self.said
-        );
+        let out = run(shell.current_dir(&self.folder));
+        let (seconds, text) = (start.elapsed().as_secs_f64(), said(&out));
+        println!("{at}: {seconds:.1} s\n{commands}{text}");
+        assert_eq!(out.status.success(), !fails, "{at}:\n{commands}\n{text}");
+        self.said += &text;
         if !fails {
             self.folder = read(&there).trim_end().into();
         }

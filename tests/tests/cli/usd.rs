@@ -366,3 +366,24 @@ fn a_missing_package_has_a_recipe() {
         assert!(said(&out).contains(words), "{}", said(&out));
     }
 }
+
+/// The stage of the book's gallery, of which nothing is lost.
+#[test]
+fn the_gallerys_stage() {
+    let folder = folder("usd_gallery");
+    let stage = repository().join("scenes/stage/stage.usda");
+    let stage = stage.to_string_lossy();
+    let render = [
+        "render",
+        &stage,
+        "-o",
+        "stage.exr",
+        "--resolution",
+        "24x16",
+        "--spp",
+        "4",
+    ];
+    let out = run(&folder, python(), &render);
+    assert!(out.status.success(), "{}", said(&out));
+    assert!(!said(&out).contains("warning"), "{}", said(&out));
+}
