@@ -80,6 +80,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         )
         .map_err(input)?;
     let integrator = ForeignIntegrator::new(instance).map_err(input)?;
+    tell_hidden(&registry);
     if let Some(file) = &a.save_scene {
         save_scene(&described, &registry, file)?;
     }
@@ -278,6 +279,19 @@ fn render(
     let rendered = go_on(from, scene, integrator, &settings, keep, stop, &report);
     display.finish();
     Ok(rendered)
+}
+
+/// Says which of several plugins of one name is in use.
+fn tell_hidden(registry: &Registry) {
+    for plugin in registry.loaded() {
+        for hidden in registry.hidden_by(&plugin) {
+            console::info(format!(
+                "there are two of the {}: {} is not used",
+                plugin.title(),
+                hidden.display()
+            ));
+        }
+    }
 }
 
 /// The media whose majorants were violated, for messages.

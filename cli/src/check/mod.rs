@@ -42,6 +42,9 @@ pub fn run(a: &Check) -> Outcome {
     if a.json {
         println!("{:#}", report.to_json());
     } else {
+        if a.brief {
+            println!("in brief, without statistics:");
+        }
         report.print();
     }
     let broken: Vec<_> = report.broken().collect();

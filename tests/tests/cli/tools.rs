@@ -1,6 +1,6 @@
 //! `info`, `compare`, `plugin` and `schema`.
 
-use crate::program::{Run, changed, folder, json, render, scene, vdb};
+use crate::program::{Run, changed, folder, json, path, render, scene, vdb};
 use serde_json::{Value, json};
 
 #[test]
@@ -288,4 +288,32 @@ fn help_has_examples() {
             .stdout
             .starts_with("resolvent ")
     );
+}
+
+/// Of two plugins of one name the first is used, and which is not is said.
+#[test]
+fn two_plugins_of_one_name() {
+    let at = folder("two_of_a_name");
+    let file = format!("libresolvent_phase_hg{}", std::env::consts::DLL_SUFFIX);
+    let beside = path().with_file_name(&file);
+    std::fs::copy(&beside, at.join(&file)).unwrap_or_else(|e| panic!("{e}"));
+    let scene = scene("cloud/cloud.json").display().to_string();
+    let render = [
+        "render",
+        &scene,
+        "--resolution",
+        "8x8",
+        "--spp",
+        "1",
+        "-o",
+        "out.png",
+    ];
+    let said = Run::new(&at, [&render[..], &["--plugin-path", "."]].concat()).done();
+    let words = [
+        "there are two of the phase plugin 'hg' (./libresolvent_phase_hg",
+        &format!("{} is not used", beside.display()),
+    ];
+    assert!(words.iter().all(|w| said.stderr.contains(w)), "{said:?}");
+    let alone = Run::new(&at, render).done();
+    assert!(!alone.stderr.contains("there are two"), "{alone:?}");
 }

@@ -105,6 +105,20 @@ impl Registry {
         folders.flat_map(move |folder| files.clone().map(|file| folder.join(file)))
     }
 
+    /// Libraries of the same kind and name later in the search path than a plugin that was found there: they are never used.
+    pub fn hidden_by(&self, plugin: &Plugin) -> Vec<PathBuf> {
+        let file = Self::file_name(plugin.kind, plugin.name());
+        let places = self.folders.iter().map(|folder| folder.join(&file));
+        let mut found = places.filter(|p| p.is_file());
+        match found.next() {
+            Some(first) if same(&first, &plugin.path) => {
+                found.filter(|p| !same(p, &first)).collect()
+            }
+            // It was named by its path.
+            _ => Vec::new(),
+        }
+    }
+
     /// Every library in the search path whose name is that of a plugin, the first of each name only, without loading any.
     pub fn available(&self) -> Vec<(PluginKind, String, PathBuf)> {
         let found = self.found().into_iter();
