@@ -46,10 +46,17 @@ NEUTRAL = {
 NEUTRAL_FOR = {
     # Tubes and spheres have no side that could be the other one.
     ("BasisCurves", "orientation"), ("Points", "orientation"), ("Sphere", "orientation"),
+    ("OpenVDBAsset", "visibility"), ("Field3DAsset", "visibility"),  # of their volumes it counts
     ("DomeLight", "inputs:normalize"), ("DomeLight_1", "inputs:normalize"),  # by the specification
     # Of effect with enableColorTemperature, a focus and an IES file.
     ("Mesh", "inputs:colorTemperature"), ("SphereLight", "inputs:shaping:focusTint"),
     ("SphereLight", "inputs:shaping:ies:angleScale"), ("SphereLight", "inputs:shaping:ies:normalize"),
+}  # fmt: skip
+
+# Prims of no effect by themselves, of which a note says so; in their places they are tested in test_volumes.py and test_materials.py.
+ALONE = {
+    "OpenVDBAsset": "a field that no volume in the picture has", "Field3DAsset": "a field that no volume in the picture has",
+    "PortalLight": "portals are of no use to this renderer", "Shader": "nothing that is drawn has this material",
 }  # fmt: skip
 
 
@@ -168,7 +175,10 @@ def silent_attributes(stage: Usd.Stage, prim: Usd.Prim, names: list[str], folder
         except Tf.ErrorException:
             continue
         after, report = scene_of(stage, folder)
-        mentioned = any(n["path"].startswith("/thing") for n in report.notes) or any(x.path.startswith(("/thing", "/")) and name.removesuffix(":indices") in f"{x.path} {x.what}" for x in report.losses)
+        what = name.removesuffix(":indices")
+        alone = ALONE.get(prim.GetTypeName())
+        mentioned = any(n["path"] == "/thing" and (what in n["note"] or n["note"] == alone) for n in report.notes)
+        mentioned |= any(what in f"{x.path} {x.what}" for x in report.losses)
         if after == before and not mentioned and not whole_prim_reported(report, prim.GetTypeName()):
             silent.append(f"{name} = {other}"[:100])
         if authored:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import DATA, PIXEL, Converted, convert_file
 
@@ -89,6 +90,39 @@ def test_images_stand_beside_the_document(tmp_path: Path) -> None:
     assert found.path(texture["file"]).resolve() == (tmp_path / "maps" / "wood.png").resolve()
     assert texture["color_space"] == "srgb" and texture["wrap_u"] == "mirror" and texture["scale"] == [0.5, 0.5, 0.25]
     assert [x for x in found.losses("/ball") if "texture coordinates" not in x] == []
+
+
+def clockwise(uv: np.ndarray, degrees: float) -> np.ndarray:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.stack([c * uv[:, 0] + s * uv[:, 1], -s * uv[:, 0] + c * uv[:, 1]], axis=1)
+
+
+@pytest.mark.parametrize(("order", "scale"), [(0, (2.0, -0.5)), (1, (0.5, 0.5))])
+def test_places_of_images(tmp_path: Path, order: int, scale: tuple[float, float]) -> None:
+    """place2d and tiledimage as MaterialX's own node graphs compute them, one after the other; what is sheared is reported."""
+    (tmp_path / "t.png").write_bytes(PIXEL)
+    place = (
+        '<place2d name="P" type="vector2"><input name="pivot" type="vector2" value="0.5, 0.25"/>'
+        f'<input name="scale" type="vector2" value="{scale[0]}, {scale[1]}"/><input name="rotate" type="float" value="30"/>'
+        f'<input name="offset" type="vector2" value="0.1, -0.2"/><input name="operationorder" type="integer" value="{order}"/></place2d>'
+    )
+    tiles = (
+        '<tiledimage name="I" type="color3"><input name="file" type="filename" value="t.png"/><input name="texcoord" type="vector2" nodename="P"/>'
+        '<input name="uvtiling" type="vector2" value="{0}"/><input name="uvoffset" type="vector2" value="0.25, 0.5"/>'
+        '<input name="realworldtilesize" type="vector2" value="2, 2"/></tiledimage>'
+    )
+    feed = surface('<input name="base_color" type="color3" nodename="I"/>')
+    found = converted(tmp_path, place + tiles.format("3, 3") + feed)
+    (texture,) = found.scene["textures"].values()
+    uv = np.random.default_rng(1).random((5, 2))
+    pivot, offset = np.array([0.5, 0.25]), np.array([0.1, -0.2])
+    inner = (clockwise((uv - pivot) / scale, 30) - offset if order == 0 else clockwise(uv - pivot - offset, 30) / scale) + pivot
+    t = texture["uv_transform"]
+    seen = clockwise(uv * t["scale"], -t["rotation_deg"]) + t["offset"]
+    assert np.allclose(seen, (3 * inner - [0.25, 0.5]) * 2, atol=1e-6) and found.losses("/looks/Materials/M/I") == []
+    if order == 0:
+        sheared = converted(tmp_path, place + tiles.format("3, 1") + feed)
+        assert any("sheared" in x for x in sheared.losses("/looks/Materials/M/I"))
 
 
 def test_colours_in_srgb(tmp_path: Path) -> None:

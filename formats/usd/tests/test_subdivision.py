@@ -6,16 +6,20 @@ import numpy as np
 import pytest
 from conftest import area_vectors
 from resolvent_usd.geometry import subdivide
+from resolvent_usd.geometry.cage import INFINITE, Cage, following
+from resolvent_usd.geometry.normals import smooth_normals
+from resolvent_usd.geometry.primvars import Topology
+from resolvent_usd.geometry.weld import welds
 
 CUBE = np.array([(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=float)
 FACES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
 
 
-def cage(points, faces, creases=(), sharpness=(), corners=None) -> subdivide.Cage:
+def cage(points, faces, creases=(), sharpness=(), corners=None) -> Cage:
     counts = np.array([len(f) for f in faces])
     edges = np.array(creases, dtype=np.int64).reshape(-1, 2)
     corner = np.zeros(len(points)) if corners is None else np.asarray(corners, dtype=float)
-    return subdivide.Cage(
+    return Cage(
         counts, np.concatenate(faces), np.asarray(points, dtype=float), edges, np.asarray(sharpness, dtype=float), corner,
         np.arange(len(faces)),
     )  # fmt: skip
@@ -74,7 +78,7 @@ def test_boundary_is_a_cubic_b_spline_that_ends_at_corners() -> None:
     points, faces = grid(4)
     points[:4, 2] = [0, 1, 3, 0]
     sharp = np.zeros(16)
-    sharp[[0, 3, 12, 15]] = subdivide.INFINITE
+    sharp[[0, 3, 12, 15]] = INFINITE
     c = cage(points, faces, corners=sharp)
     for _ in range(3):
         c = subdivide.step(c)
@@ -124,8 +128,7 @@ def test_edges_are_those_of_the_faces() -> None:
     for mesh in (cage(CUBE, FACES, loop(1), [2.5] * 4), cage(points, mixed)):
         fine = subdivide.step(subdivide.step(mesh))
         known = fine.edges
-        following = subdivide.following(fine.counts)
-        ends = np.sort(np.stack([fine.indices, fine.indices[following]], axis=1), axis=1)
+        ends = np.sort(np.stack([fine.indices, fine.indices[following(fine.counts)]], axis=1), axis=1)
         assert np.array_equal(np.sort(known.ends[known.of_corner], axis=1), ends)
         assert len(np.unique(ends, axis=0)) == len(known.ends)
         assert np.array_equal(np.bincount(known.of_corner), known.faces)
@@ -151,7 +154,7 @@ def test_normals_break_at_sharp_edges_only() -> None:
     c = cage(CUBE, FACES, loop(1), [10.0] * 4)
     for _ in range(2):
         c = subdivide.step(c)
-    normals, which = subdivide.smooth_normals(c, c.data)
+    normals, which = smooth_normals(c, c.data)
     at: dict[int, set[int]] = {}
     for point, n in zip(c.indices, which, strict=True):
         at.setdefault(int(point), set()).add(int(n))
@@ -208,12 +211,9 @@ def test_wrong_creases_name_the_prim(convert_text) -> None:
 @pytest.mark.parametrize("kinds", [1, 3, 40])
 def test_corners_of_a_point_with_equal_values_are_one(kinds: int) -> None:
     """However many different values meet at a point: by a dictionary, and by what the mesh of texture coordinates is made of."""
-    from resolvent_usd.geometry.primvars import Topology
-    from resolvent_usd.geometry.refine import _welds
-
     rng = np.random.default_rng(kinds)
     indices, values = rng.integers(0, 5, 600), rng.integers(0, kinds, (600, 2)).astype(np.float32)
-    first, which = _welds(Topology(5, np.full(200, 3), indices), values)
+    first, which = welds(Topology(5, np.full(200, 3), indices), values)
     places: dict[tuple[int, ...], int] = {}
     for corner, key in enumerate(zip(indices, *values.T, strict=True)):
         places.setdefault(key, corner)
@@ -226,3 +226,39 @@ def test_loop_subdivision_is_reported(convert_text) -> None:
     found = convert_text(triangles % 'uniform token subdivisionScheme = "loop"')
     (loss,) = [x for x in found.report.losses if x.path == "/m"]
     assert (loss.kind, loss.what) == ("approximated", "subdivisionScheme") and "Loop" in loss.reason
+
+
+@pytest.mark.parametrize("level", [1, 3])
+def test_texture_coordinates_follow_creases(convert_text, level: int) -> None:
+    """Coordinates that are the positions stay the positions, over semi-sharp creases and corners as well (OpenSubdiv's rule for
+    face-varying data that are continuous)."""
+    rng = np.random.default_rng(4)
+    points, faces = grid(5)
+    points += rng.uniform(-0.3, 0.3, points.shape)
+    corners = np.concatenate(faces)
+    found = convert_text(
+        f"""def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
+    int[] faceVertexCounts = {[4] * len(faces)}
+    int[] faceVertexIndices = {corners.tolist()}
+    point3f[] points = {[tuple(p) for p in points.tolist()]}
+    int[] creaseIndices = [6, 7, 8, 13, 12, 11]
+    int[] creaseLengths = [3, 3]
+    float[] creaseSharpnesses = [1.5, 10]
+    int[] cornerIndices = [16, 18]
+    float[] cornerSharpnesses = [2.5, 10]
+    texCoord2f[] primvars:st = {[tuple(p) for p in points[corners, :2].tolist()]} (interpolation = "faceVarying")
+    rel material:binding = </m/mat>
+    def Material "mat" {{
+        token outputs:surface.connect = </m/mat/s.outputs:surface>
+        def Shader "s" {{
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </m/mat/t.outputs:rgb>
+            token outputs:surface
+        }}
+        def Shader "t" {{ uniform token info:id = "UsdUVTexture"; asset inputs:file = @./texture.png@; float3 outputs:rgb; }}
+    }}
+}}""",
+        subdivision=level,
+    )
+    (mesh,) = found.meshes()
+    assert np.abs(mesh["TEXCOORD_0"] - mesh["POSITION"][:, :2]).max() < 2e-6

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from ..claim import Claim
 from ..context import Context
 from . import primvars, subdivide
-from .glb import Triangles, compact
+from .cage import INFINITE, Cage, following, sharp_edges
+from .glb import Triangles
+from .normals import smooth_normals
 from .polygons import triangulate
 from .primvars import Primvar, Topology
+from .weld import welded, welds
 
 Array = NDArray[Any]
 Ints = NDArray[np.int64]
@@ -75,101 +78,7 @@ class Surface:
             corners = corners[keep[polygon]]
         if self.flipped:
             corners = corners[:, ::-1]
-        return _welded(self.points, self.indices, corners, self.normals, uv, colors)
-
-
-def _welded(
-    points: Array,
-    indices: Ints,
-    corners: Ints,
-    normals: tuple[Array, Ints] | None,
-    uv: tuple[Array, Ints] | None,
-    colors: tuple[Array, Ints] | None,
-) -> Triangles:
-    """Corners of a point that have in everything what its first corner has become one vertex with it."""
-    attributes = (normals, uv, colors)
-    apart = [a for a in attributes if a is not None and a[1] is not indices]
-    if apart:
-        first = _first_corners(indices, len(points))
-        shared = _shared(apart, indices, first)
-        if shared is not None:
-            source, vertex = shared
-            if len(source) == len(indices):
-                return compact(Triangles(points.take(indices, axis=0), corners, *map(_whole, attributes)))
-            place = points.take(indices.take(source), axis=0)
-            return compact(Triangles(place, vertex.take(corners), *(_taken(a, source) for a in attributes)))
-
-    # Everything hangs on the point.
-    def per_point(a: tuple[Array, Ints] | None) -> Array | None:
-        if a is None or a[1] is indices:
-            return None if a is None else a[0]
-        return a[0].take(a[1].take(first), axis=0)
-
-    return compact(Triangles(points, indices.take(corners), *(per_point(a) for a in attributes)))
-
-
-def _taken(a: tuple[Array, Ints] | None, corners: Ints) -> Array | None:
-    """The values at some corners."""
-    return None if a is None else a[0].take(a[1].take(corners), axis=0)
-
-
-def _whole(a: tuple[Array, Ints] | None) -> Array | None:
-    """The values at all corners."""
-    if a is None or _one_each(a[1]):
-        return None if a is None else a[0]
-    return a[0].take(a[1], axis=0)
-
-
-def _first_corners(indices: Ints, size: int) -> Ints:
-    """For each point its first corner (0 for those without)."""
-    first = np.zeros(size, dtype=np.int64)
-    first[indices[::-1]] = np.arange(len(indices) - 1, -1, -1)
-    return first
-
-
-def _shared(attributes: list[tuple[Array, Ints]], indices: Ints, first: Ints) -> tuple[Ints, Ints] | None:
-    """Vertices, in the order of their first corners: those corners, and for each corner its vertex. None if points are enough."""
-    leader = first.take(indices)
-    different = [_differ(values, which, which.take(leader)) for values, which in attributes]
-    own = np.logical_or.reduce(different)
-    if not own.any():
-        return None
-    alone = np.zeros(len(indices), dtype=bool)
-    for (_, which), differs in zip(attributes, different, strict=True):
-        if _one_each(which):
-            alone |= differs
-    leads = leader.copy()
-    leads[own] = np.flatnonzero(own)
-    # Others that differ from the first may be alike: where all that they have was given to several corners by one number.
-    if len(rest := np.flatnonzero(own & ~alone)):
-        key = indices[rest]
-        for (_, which), differs in zip(attributes, different, strict=True):
-            numbers = np.where(differs[rest], which[rest], which[leader[rest]])
-            key = np.unique(key, return_inverse=True)[1] * (int(which.max()) + 1) + numbers
-        _, least, group = np.unique(key, return_index=True, return_inverse=True)
-        leads[rest] = rest[least][group]
-    return _numbered(leads)
-
-
-def _numbered(leads: Ints) -> tuple[Ints, Ints]:
-    """Of corners that each have a leading one: those that lead, and for each corner the number of its own."""
-    leading = np.zeros(len(leads), dtype=bool)
-    leading[leads] = True
-    return np.flatnonzero(leading), (np.cumsum(leading) - 1).take(leads)
-
-
-def _one_each(which: Ints) -> bool:
-    """True if every corner has a value of its own."""
-    return len(which) > 0 and int(which[-1]) == len(which) - 1 and np.array_equal(which, np.arange(len(which)))
-
-
-def _differ(values: Array, a: Ints, b: Ints) -> NDArray[np.bool_]:
-    """True where rows a and b of the values differ."""
-    out: NDArray[np.bool_] = a != b
-    at = np.flatnonzero(out)
-    other = values.take(a.take(at), axis=0) != values.take(b.take(at), axis=0)
-    out[at] = other[:, 0] if other.shape[1] == 1 else np.logical_or.reduce(list(other.T))
-    return out
+        return welded(self.points, self.indices, corners, self.normals, uv, colors)
 
 
 def refine(
@@ -209,7 +118,7 @@ def refine(
         None, lambda name, width: _subdivided_data(claim, name, width, topology, rules, level, smooth),
     )  # fmt: skip
     if smooth:
-        values, which = subdivide.smooth_normals(cage, cage.data)
+        values, which = smooth_normals(cage, cage.data)
         surface.normals = _single(-values if flipped else values), which
     return surface
 
@@ -267,16 +176,20 @@ class _Rules:
             edges, sharpness, corners, corner_sharpness,
         )  # fmt: skip
 
-    def cage(self, topology: Topology, data: Array) -> subdivide.Cage:
+    def cage(self, topology: Topology, data: Array) -> Cage:
+        return Cage(
+            topology.counts, topology.indices, np.asarray(data, dtype=float), self.crease_edges, self.crease_sharpness,
+            self.corner(topology), np.arange(len(topology.counts)),
+        )  # fmt: skip
+
+    def corner(self, topology: Topology) -> Floats:
+        """Sharpness of the points."""
         corner = np.zeros(topology.points)
         np.maximum.at(corner, self.corners, self.corner_sharpness)
         if self.boundary == "edgeAndCorner":
             # A corner of one face only stays where it is.
-            corner[np.bincount(topology.indices, minlength=topology.points) == 1] = subdivide.INFINITE
-        return subdivide.Cage(
-            topology.counts, topology.indices, np.asarray(data, dtype=float), self.crease_edges, self.crease_sharpness,
-            corner, np.arange(len(topology.counts)),
-        )  # fmt: skip
+            corner[np.bincount(topology.indices, minlength=topology.points) == 1] = INFINITE
+        return corner
 
 
 def _single(values: Array) -> Array:
@@ -286,16 +199,16 @@ def _single(values: Array) -> Array:
 
 def _touches_boundary(topology: Topology) -> NDArray[np.bool_]:
     """Faces that the boundary rule "none" leaves out: those with a vertex on a boundary."""
-    cage = subdivide.Cage(
+    cage = Cage(
         topology.counts, topology.indices, np.zeros((topology.points, 0)), np.empty((0, 2), dtype=np.int64),
         np.empty(0), np.zeros(topology.points), np.arange(len(topology.counts)),
     )  # fmt: skip
-    of_corner, sharp = subdivide.sharp_edges(cage)
+    of_corner, sharp = sharp_edges(cage)
     on_boundary = np.zeros(topology.points, dtype=bool)
-    following = subdivide.following(topology.counts)
+    after = following(topology.counts)
     edge = sharp[of_corner]
     on_boundary[topology.indices[edge]] = True
-    on_boundary[topology.indices[following[edge]]] = True
+    on_boundary[topology.indices[after[edge]]] = True
     starts = np.cumsum(topology.counts) - topology.counts
     return np.asarray(np.logical_or.reduceat(on_boundary[topology.indices], starts))
 
@@ -371,49 +284,36 @@ def _subdivided_data(
     return _single(cage.data), cage.indices
 
 
-def _welds(topology: Topology, values: Array) -> tuple[Ints, Ints]:
-    """Corners of a point with equal values are one: the first corners, and for each corner the number of its own."""
-    indices = topology.indices
-    leads, rest = np.arange(len(indices)), np.arange(len(indices))
-    # Most have what the first one has, or the first of those that have not.
-    for _ in range(8):
-        here = indices.take(rest)
-        leader = rest.take(_first_corners(here, topology.points).take(here))
-        differs = _differ(values, rest, leader)
-        leads[rest] = leader
-        rest = rest[differs]
-        if len(rest) == 0:
-            break
-    else:
-        rest = rest[np.lexsort((*values[rest].T, indices[rest]))]
-        new = np.ones(len(rest), dtype=bool)
-        new[1:] = _differ(values, rest[1:], rest[:-1]) | (indices[rest[1:]] != indices[rest[:-1]])
-        leads[rest] = rest[new][np.cumsum(new) - 1]
-    return _numbered(leads)
-
-
-def _face_varying_cage(topology: Topology, values: Array, rules: _Rules) -> subdivide.Cage:
+def _face_varying_cage(topology: Topology, values: Array, rules: _Rules) -> Cage:
     """The mesh of the texture coordinates: points split where neighbouring faces disagree, seams are its boundaries."""
-    first, inverse = _welds(topology, values)
+    first, inverse = welds(topology, values)
     size = len(first)
     point = topology.indices[first]
-    # Creases of the mesh hold where the coordinates are continuous: both of an edge's sides have the same two values.
-    corner = np.zeros(size)
-    regions = np.bincount(point, minlength=topology.points)
+    regions = np.bincount(point, minlength=topology.points)[point]
+    # A point with one value keeps its own sharpness; one that is sharp for ever keeps all its values where they are.
+    own = rules.corner(topology)[point]
+    corner = np.where((regions == 1) | (own >= INFINITE), own, 0.0)
     if rules.face_varying in ("cornersOnly", "cornersPlus1", "cornersPlus2"):
-        corner[np.bincount(inverse, minlength=size) == 1] = subdivide.INFINITE
+        corner[np.bincount(inverse, minlength=size) == 1] = INFINITE
     if rules.face_varying in ("cornersPlus1", "cornersPlus2"):
         # Where three regions or more meet.
-        corner[regions[point] > 2] = subdivide.INFINITE
-    cage = subdivide.Cage(
+        corner[regions > 2] = INFINITE
+    cage = Cage(
         topology.counts, inverse, np.asarray(values[first], dtype=float), np.empty((0, 2), dtype=np.int64), np.empty(0),
         corner, np.arange(len(topology.counts)),
     )  # fmt: skip
     if rules.face_varying == "boundaries":
         # All seams and boundaries are linear.
-        of_corner, sharp = subdivide.sharp_edges(cage)
-        following = subdivide.following(topology.counts)
+        of_corner, sharp = sharp_edges(cage)
+        after = following(topology.counts)
         seam = sharp[of_corner]
-        corner[inverse[seam]] = subdivide.INFINITE
-        corner[inverse[following[seam]]] = subdivide.INFINITE
+        corner[inverse[seam]] = INFINITE
+        corner[inverse[after[seam]]] = INFINITE
+    if len(rules.crease_edges):
+        # The mesh's creases hold where the coordinates are continuous; elsewhere there is a seam, which is sharp anyway.
+        mesh, edges = rules.cage(topology, np.empty((topology.points, 0))).edges, cage.edges
+        sharpness = np.zeros(len(edges.ends))
+        np.maximum.at(sharpness, edges.of_corner, mesh.sharpness[mesh.of_corner])
+        at = np.flatnonzero(sharpness)
+        cage = replace(cage, crease_edges=edges.ends[at], crease_sharpness=sharpness[at])
     return cage

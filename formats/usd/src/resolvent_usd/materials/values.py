@@ -59,6 +59,35 @@ class Value:
         return self.texture is None and bool(np.allclose(self.constant, three(value), atol=1e-9))
 
 
+def _affine(linear: Any, move: Any) -> Array:
+    out: Array = np.eye(3)
+    out[:2, :2], out[:2, 2] = linear, move
+    return out
+
+
+def _turn(degrees: float) -> Array:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, -s], [s, c]])
+
+
+def _pair(node: Node, name: str, plain: float) -> Array:
+    return np.asarray(node.value(name, (plain, plain)), dtype=float)
+
+
+def _transform2d(node: Node) -> Array:
+    """UsdTransform2d: scaled, turned counter-clockwise, moved."""
+    return _affine(_turn(float(node.value("rotation", 0.0))) @ np.diag(_pair(node, "scale", 1.0)), _pair(node, "translation", 0.0))
+
+
+def _place2d(node: Node) -> Array:
+    """MaterialX: around the pivot, divided by the scale, turned clockwise, the offset subtracted; or in the opposite order."""
+    pivot, scale, offset = (_pair(node, name, plain) for name, plain in (("pivot", 0.0), ("scale", 1.0), ("offset", 0.0)))
+    turn, shrink = _affine(_turn(-float(node.value("rotate", 0.0))), 0.0), _affine(np.diag(1.0 / np.where(scale == 0.0, 1.0, scale)), 0.0)
+    move = _affine(np.eye(2), -offset)
+    order = move @ turn @ shrink if int(node.value("operationorder", 0)) == 0 else shrink @ turn @ move
+    return np.asarray(_affine(np.eye(2), pivot) @ order @ _affine(np.eye(2), -pivot))
+
+
 def three(value: Any) -> Array:
     """One number or three as three."""
     array = np.asarray(value, dtype=float).reshape(-1)
@@ -160,7 +189,7 @@ class Builder:
             mode = str(node.value(f"wrap{axis}", "useMetadata"))
             # The specification: without metadata in the file, black.
             texture["wrap_" + ("u" if axis == "S" else "v")] = _WRAPS.get(mode, "black")
-        texture |= self._place(node, "st")
+        texture |= self._transform(node, self._place(node, "st"))
         if channel is not None:
             texture["channel"] = channel
             return Value(np.repeat(fallback[index], 3), texture, np.repeat(scale[index], 3), np.repeat(bias[index], 3))
@@ -186,12 +215,16 @@ class Builder:
             texture[f"wrap_{axis}"] = _ADDRESS.get(mode, "repeat")
         if str(node.value("filtertype", "linear")) == "closest":
             texture["filter"] = "nearest"
-        texture |= self._place(node, "texcoord")
+        place = self._place(node, "texcoord")
         if kind == "tiledimage":
-            tiling = np.asarray(node.value("uvtiling", (1.0, 1.0)), dtype=float)
-            offset = np.asarray(node.value("uvoffset", (0.0, 0.0)), dtype=float)
-            texture["uv_transform"] = {"scale": tiling.tolist(), "offset": (-offset * tiling).tolist()}
-        for name in ("layer", "framerange", "frameoffset", "frameendaction", "realworldimagesize", "realworldtilesize"):
+            tiling, offset, image_size, tile_size = (
+                np.asarray(node.value(name, (plain, plain)), dtype=float)
+                for name, plain in (("uvtiling", 1.0), ("uvoffset", 0.0), ("realworldimagesize", 1.0), ("realworldtilesize", 1.0))
+            )
+            size = tile_size / np.where(image_size == 0.0, 1.0, image_size)
+            place = _affine(np.diag(tiling * size), -offset * size) @ place
+        texture |= self._transform(node, place)
+        for name in ("layer", "framerange", "frameoffset", "frameendaction"):
             node.claim.no_effect(f"inputs:{name}", "this setting of images is not there", "the image is shown as it is")
         return Value(default, texture)
 
@@ -220,37 +253,56 @@ class Builder:
             raise InputError(attribute.GetPath(), f"there is no tile '{asset.path}' in {folder}")
         return self.ctx.files.relative(path)
 
-    def _place(self, node: Node, name: str) -> Json:
-        """Texture coordinates: the primvar goes to ``uv``, transforms to the texture."""
+    def _place(self, node: Node, name: str) -> Array:
+        """Texture coordinates: the primvar goes to ``uv``, what transforms it is returned (3×3)."""
         link = node.link(name)
-        transform: Json = {}
+        place: Array = np.eye(3)
         for _ in range(MAX_DEPTH):
             if link is None:
                 break
             inner = link.node
             kind = kind_of(inner)
-            if kind == "UsdTransform2d" and not transform:
-                transform = {"uv_transform": self._transform(inner)}
+            if kind == "UsdTransform2d":
+                place = place @ _transform2d(inner)
                 link = inner.link("in")
                 continue
-            if kind == "place2d" and not transform:
-                transform = {"uv_transform": self._place2d(inner)}
+            if kind == "place2d":
+                place = place @ _place2d(inner)
                 link = inner.link("texcoord")
                 continue
             if kind.startswith("UsdPrimvarReader") or kind == "geompropvalue":
                 inner.claim.take("inputs:fallback", "inputs:default")
                 self._use_uv(node, str(inner.value("varname") or inner.value("geomprop") or "st"))
-                return transform
+                return place
             if kind == "texcoord":
                 index = int(inner.value("index", 0))
                 self._use_uv(node, "st" if index == 0 else f"st{index}")
-                return transform
+                return place
             node.claim.approximated(
                 f"inputs:{name}", f"{inner.described} is connected, which gives no texture coordinates that are known", "primvar st is used"
             )
             break
+        else:
+            raise InputError(node.path, "the shader network has no end: its nodes are connected in a circle")
         self._use_uv(node, "st")
-        return transform
+        return place
+
+    @staticmethod
+    def _transform(node: Node, place: Array) -> Json:
+        """The scene's scale, rotation and offset of a matrix."""
+        if np.allclose(place, np.eye(3), rtol=0, atol=1e-12):
+            return {}
+        (a, b), (c, d) = place[:2, :2]
+        width = float(np.hypot(a, c))
+        if width == 0.0 or abs(a * b + c * d) > 1e-6 * max(width**2, b * b + d * d):
+            node.claim.approximated("inputs:texcoord", "its texture coordinates are sheared", "only turned, scaled and moved")
+        angle = float(np.degrees(np.arctan2(c, a)))
+        scale = [width, (a * d - b * c) / width if width > 0.0 else float(np.hypot(b, d))]
+        # Half a turn of mirrored coordinates is a mirror of the others: the smaller angle is the plainer one.
+        if abs(angle) > 90.0:
+            angle, scale = angle - np.copysign(180.0, angle), [-x for x in scale]
+        out = {"scale": scale, "rotation_deg": angle, "offset": place[:2, 2]}
+        return {"uv_transform": {k: np.round(np.asarray(v, dtype=float), 9).tolist() for k, v in out.items()}}
 
     def _use_uv(self, node: Node, name: str) -> None:
         if self.uv is None:
@@ -259,22 +311,6 @@ class Builder:
             node.claim.approximated(
                 "inputs:st", f"reads the primvar '{name}', another texture of the material '{self.uv}'", f"both use '{self.uv}'"
             )
-
-    def _transform(self, node: Node) -> Json:
-        scale = np.asarray(node.value("scale", (1.0, 1.0)), dtype=float)
-        move = np.asarray(node.value("translation", (0.0, 0.0)), dtype=float)
-        return {"scale": scale.tolist(), "rotation_deg": float(node.value("rotation", 0.0)), "offset": move.tolist()}
-
-    def _place2d(self, node: Node) -> Json:
-        """MaterialX: ((uv − pivot) / scale, rotated clockwise) − offset + pivot."""
-        pivot = np.asarray(node.value("pivot", (0.0, 0.0)), dtype=float)
-        scale = np.asarray(node.value("scale", (1.0, 1.0)), dtype=float)
-        offset = np.asarray(node.value("offset", (0.0, 0.0)), dtype=float)
-        angle = -float(node.value("rotate", 0.0))
-        node.claim.take("inputs:operationorder")
-        c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        back = np.array([[c, -s], [s, c]]) @ (-pivot / scale)
-        return {"scale": (1.0 / scale).tolist(), "rotation_deg": angle, "offset": (back - offset + pivot).tolist()}
 
     # Primvars
 
