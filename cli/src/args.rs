@@ -64,6 +64,7 @@ Examples:
   resolvent render scene.json -o tile.exr --crop 0,0,320,180
   resolvent render scene.json -o out.exr --spp 4096 --checkpoint out.ckpt --resume    (again after a crash)
   resolvent render scene.json --sample-range 64..128 --checkpoint b.ckpt    (resolvent merge a.ckpt b.ckpt -o out.exr)
+  resolvent render scene.json -o out.png --spp 16 --watch    (again after every change, until Ctrl-C)
   resolvent render shot.usd --frames 1-100:2 -o shot.####.exr
 
 Ctrl-C ends the rendering and saves what is finished (exit code 3); a second Ctrl-C aborts at once. Of a sequence it says which frames are left; frames that are there already are rendered again, unless --checkpoint shot.####.ckpt --resume has their sums.";
@@ -142,6 +143,13 @@ pub struct Render {
     /// Write the scene as it is rendered, options and guesses included
     #[arg(long, value_name = "FILE.json")]
     pub save_scene: Option<PathBuf>,
+    /// Render again whenever the input, a file that it names or a plugin in use changes; a change ends the render in progress. Errors are
+    /// shown, and leave the last picture as it is. Ctrl-C ends it
+    #[arg(long, conflicts_with_all = ["checkpoint", "save_scene", "frames"])]
+    pub watch: bool,
+    /// One render of --watch: for the process that it starts
+    #[arg(long, hide = true)]
+    pub watched: bool,
     /// Print only warnings and errors
     #[arg(short, long)]
     pub quiet: bool,
@@ -533,14 +541,26 @@ pub enum Language {
     C,
 }
 
+const CHECK_HELP: &str = "\
+Example:
+  resolvent plugin check target/release/libmine.so --isolate
+
+Data races of a plugin in C or C++, found although the answers are right:
+  cc -g -O1 -fsanitize=thread -shared -fPIC mine.c -o mine.so -lm
+  LD_PRELOAD=libtsan.so.2 resolvent plugin check ./mine.so --brief";
+
 /// Options of `plugin check`.
 #[derive(Debug, ClapArgs)]
+#[command(after_help = CHECK_HELP)]
 pub struct Check {
     /// A plugin's name, or the path of its library
     pub plugin: String,
     /// Parameters to check it with, as JSON; those that are not given are varied over their ranges
     #[arg(long, value_name = "JSON")]
     pub params: Option<String>,
+    /// Only what needs no statistics: declarations, determinism, threads, memory
+    #[arg(long)]
+    pub brief: bool,
     /// Check in a process of its own, so that a crash or a hang is reported like any other fault
     #[arg(long)]
     pub isolate: bool,

@@ -29,6 +29,7 @@ mod template;
 mod usd;
 mod values;
 mod volume;
+mod watch;
 
 use clap::Parser;
 use failure::Failure;

@@ -23,6 +23,13 @@ pub struct Target {
     format: Format,
 }
 
+impl Target {
+    /// Where it is written.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
 /// The pictures asked for, or the default one for `input_file`; their folders can be written to.
 pub fn targets(asked: &[PathBuf], input_file: Option<&Path>) -> Outcome<Vec<Target>> {
     let mut paths = asked.to_vec();

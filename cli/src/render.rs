@@ -5,12 +5,13 @@ use crate::checkpoint::{self, Keeper};
 use crate::console;
 use crate::failure::{Code, Failure, Outcome, failed, input};
 use crate::input::Kind;
-use crate::interrupt::{self, Phase};
+use crate::interrupt::{self, On, Phase};
 use crate::output::{self, Target};
 use crate::overrides::{self, Plan};
 use crate::progress::Display;
 use crate::sequence;
 use crate::stats::{self, About, Certainty, Seconds};
+use crate::watch;
 use resolvent_api::{Affine, PluginKind};
 use resolvent_engine::plugin::{ForeignIntegrator, Message, Registry, set_log};
 use resolvent_engine::scene::Scene;
@@ -20,8 +21,15 @@ use std::time::{Duration, Instant};
 
 /// Runs the command.
 pub fn run(a: &Render) -> Outcome {
+    if a.watch && !a.watched {
+        return watch::run(a);
+    }
     console::set_quiet(a.quiet);
-    interrupt::install();
+    if a.watched {
+        watch::begin();
+        watch::reads([&a.input]);
+    }
+    interrupt::install(if a.watched { On::Discard } else { On::Save });
     set_log(|message| match message {
         Message::Warning(text) => console::warning(text),
         Message::Info(text) => console::info(text),
@@ -54,7 +62,11 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let mut described = describe(a, kind)?;
     let plan = overrides::apply(a, &mut described)?;
     seconds.parse = start.elapsed().as_secs_f64();
-    let registry = a.plugins.registry()?;
+    let mut registry = a.plugins.registry()?;
+    if a.watched {
+        registry = registry.copying();
+        watch::reads(watch::of_scene(&described, &registry));
+    }
 
     let built = Scene::build(&described, &registry).map_err(|e| named(a, kind, &e))?;
     let instance = registry
@@ -94,10 +106,12 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         Ok(rendered) => (rendered, None),
         Err(broken) => {
             // A plugin is the user's input as much as a scene is.
-            let error = input(broken.error);
-            match broken.rendered {
-                Some(rendered) => (*rendered, Some(error)),
-                None => return Err(error),
+            let resolvent_engine::Broken { error, rendered } = *broken;
+            let error = input(error);
+            match rendered {
+                // Who watches keeps the last whole picture.
+                Some(rendered) if !a.watched => (*rendered, Some(error)),
+                _ => return Err(error),
             }
         }
     };
@@ -170,7 +184,7 @@ fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
 }
 
 /// Refuses options that are for other inputs.
-fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
+pub fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
     if let (Kind::Scene | Kind::Usd, Some(option)) = (kind, a.guesses.given()) {
         let what = if kind == Kind::Usd {
             "USD stage"

@@ -1,4 +1,7 @@
-//! What the operating system says about memory and time.
+//! What the operating system says about memory, time and the ends of processes.
+
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
 
 /// Largest memory this process has held, bytes; `None` where the system does not say.
 pub fn peak_memory() -> Option<u64> {
@@ -17,6 +20,23 @@ pub fn cpu_seconds() -> Option<f64> {
     let seconds = [usage.user_time(), usage.system_time()]
         .map(|t| t.tv_sec() as f64 + t.tv_usec() as f64 * 1e-6);
     Some(seconds[0] + seconds[1])
+}
+
+/// What ended a process that did not end by itself as it should.
+pub fn ending(status: ExitStatus) -> String {
+    let Some(signal) = status.signal() else {
+        return format!("it ends the process: {status}");
+    };
+    let name = match signal {
+        4 => "SIGILL",
+        6 => "SIGABRT",
+        7 => "SIGBUS",
+        8 => "SIGFPE",
+        9 => "SIGKILL",
+        11 => "SIGSEGV",
+        _ => "a signal",
+    };
+    format!("it crashes: {name} ({signal})")
 }
 
 fn proc_kilobytes(file: &str, key: &str) -> Option<u64> {

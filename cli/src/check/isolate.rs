@@ -10,7 +10,7 @@ use crate::failure::{Code, Outcome, failed, input};
 use resolvent_conformance::{Failure, Suite, Verdict, property};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -41,6 +41,9 @@ pub fn parent(a: &Check) -> Outcome<Report> {
     command.args(["plugin", "check", &a.plugin, "--stages"]);
     if let Some(params) = &a.params {
         command.args(["--params", params]);
+    }
+    if a.brief {
+        command.arg("--brief");
     }
     for folder in &a.plugins.plugin_path {
         command.arg("--plugin-path").arg(folder);
@@ -83,7 +86,7 @@ pub fn parent(a: &Check) -> Outcome<Report> {
             }
             Err(RecvTimeoutError::Disconnected) => {
                 let status = child.wait().map_err(failed)?;
-                return Ok(fatal(a, &last, &ending(status)));
+                return Ok(fatal(a, &last, &crate::system::ending(status)));
             }
         }
     }
@@ -105,27 +108,6 @@ fn listen(child: &mut Child) -> Receiver<Value> {
         });
     }
     receive
-}
-
-/// What ended a process.
-fn ending(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    {
-        use std::os::unix::process::ExitStatusExt;
-        if let Some(signal) = status.signal() {
-            let name = match signal {
-                4 => "SIGILL",
-                6 => "SIGABRT",
-                7 => "SIGBUS",
-                8 => "SIGFPE",
-                9 => "SIGKILL",
-                11 => "SIGSEGV",
-                _ => "a signal",
-            };
-            return format!("it crashes: {name} ({signal})");
-        }
-    }
-    format!("it ends the process: {status}")
 }
 
 /// The report on a plugin that a check did not survive.

@@ -31,7 +31,8 @@ const ROUNDS: usize = 8;
 /// All of it, with the parameters every instance is made with.
 pub fn check(suite: &mut Suite, subject: &Subject, stages: Stages) -> Outcome<()> {
     let make = || subject.make(&subject.base).map_err(input);
-    let (first, second) = (make()?, make()?);
+    // This one is asked by many threads first: what it prepares at its first question, it prepares then.
+    let (first, second, fresh) = (make()?, make()?, make()?);
 
     stages(property::DETERMINISM, "two instances");
     suite.about(property::DETERMINISM);
@@ -63,12 +64,12 @@ pub fn check(suite: &mut Suite, subject: &Subject, stages: Stages) -> Outcome<()
     suite.about(property::THREADS);
     let start = Barrier::new(THREADS);
     let answers: Vec<Vec<u32>> = std::thread::scope(|scope| {
-        let (start, second, truth) = (&start, &second, &truth);
+        let (start, fresh, truth) = (&start, &fresh, &truth);
         let ask = move |i: usize| {
             start.wait();
             let begun = Instant::now();
             loop {
-                let answers = fingerprint(subject, second, i % 2 == 1);
+                let answers = fingerprint(subject, fresh, i % 2 == 1);
                 // Long enough for threads to meet, even where there are fewer processors.
                 if answers != *truth || begun.elapsed() > TOGETHER {
                     return answers;
@@ -79,6 +80,7 @@ pub fn check(suite: &mut Suite, subject: &Subject, stages: Stages) -> Outcome<()
         let answers = workers.into_iter().map(|w| w.join().unwrap_or_default());
         answers.collect()
     });
+    drop(fresh);
     for (i, a) in answers.iter().enumerate() {
         let what = format!("thread {i} of {THREADS} that share an instance");
         same(suite, &what, a);

@@ -65,13 +65,22 @@ fn examine(a: &Check, stages: Stages) -> Outcome<Report> {
     let mut suite = Suite::with_effort(EFFORT);
     stages(property::PARAMETERS, "declarations");
     declared::check(&mut suite, &subject);
-    let variants = variants::thorough(&subject);
+    let variants = if a.brief {
+        Vec::new()
+    } else {
+        variants::thorough(&subject)
+    };
     for v in &variants {
         thorough(&mut suite, &subject, v, stages)?;
     }
     life::check(&mut suite, &subject, stages)?;
     let mut refused = Vec::new();
-    for v in variants::each_alone(&subject) {
+    let each_alone = if a.brief {
+        Vec::new()
+    } else {
+        variants::each_alone(&subject)
+    };
+    for v in each_alone {
         stages(property::PARAMETERS, &v.name);
         match subject.make(&v.params) {
             Ok(instance) => {

@@ -32,6 +32,8 @@ impl Report {
         println!("{} {}", self.title, self.version);
         if !self.variants.is_empty() {
             println!("checked in full with: {}", self.variants.join("; "));
+        } else {
+            println!("checked in brief, without statistics");
         }
         for (reason, values) in self.refused_by_reason() {
             println!("refused: {}: {reason}", values.join(", "));

@@ -5,7 +5,7 @@ mod gltf;
 mod scene;
 mod vdb;
 
-pub use scene::named_files;
+pub use scene::{files_of_parts, named_files};
 pub use vdb::short;
 
 use crate::args::Info;

@@ -183,6 +183,27 @@ fn plugins(scene: &Scene, registry: &Registry) -> Vec<Named> {
 
 /// The files that the scene names, as paths from the current folder, each once.
 pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
+    let mut out = files_of_parts(scene);
+    // Tiled images have no file of their own name.
+    out.retain(|path| !path.to_string_lossy().contains("<UDIM>"));
+    let mut known: HashSet<_> = out.iter().cloned().collect();
+    walk(scene, registry, &mut |_, block, decl| {
+        for p in decl.iter().flat_map(|d| &d.params) {
+            if p.kind == ParamKind::File
+                && let Some(Value::Text(file)) = block.params.get(&p.name).map(|v| &v.value)
+            {
+                let path = scene.resolve(file);
+                if known.insert(path.clone()) {
+                    out.push(path);
+                }
+            }
+        }
+    });
+    out
+}
+
+/// The files that lights, textures, shapes and instances name, each once. What plugins are given is theirs.
+pub fn files_of_parts(scene: &Scene) -> Vec<PathBuf> {
     let mut out = Vec::new();
     let mut known = HashSet::new();
     let mut add = |file: &str| {
@@ -197,9 +218,7 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
         }
     }
     for t in scene.textures.values() {
-        if let ImageSource::File(file) = &t.image
-            && !file.contains("<UDIM>")
-        {
+        if let ImageSource::File(file) = &t.image {
             add(file);
         }
     }
@@ -213,15 +232,6 @@ pub fn named_files(scene: &Scene, registry: &Registry) -> Vec<PathBuf> {
             add(file);
         }
     }
-    walk(scene, registry, &mut |_, block, decl| {
-        for p in decl.iter().flat_map(|d| &d.params) {
-            if p.kind == ParamKind::File
-                && let Some(Value::Text(file)) = block.params.get(&p.name).map(|v| &v.value)
-            {
-                add(file);
-            }
-        }
-    });
     out
 }
 

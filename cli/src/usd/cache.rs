@@ -62,12 +62,38 @@ impl Entry {
         (same && scene.is_file()).then_some((scene, losses))
     }
 
+    /// The files that the kept conversion was made of.
+    pub fn layers(&self) -> Vec<PathBuf> {
+        layers(&self.folder)
+    }
+
     /// A folder to convert into.
     pub fn begin(&self) -> Outcome<&Path> {
         let _ = std::fs::remove_dir_all(&self.draft);
+        self.remove_leftovers();
         std::fs::create_dir_all(&self.draft)
             .map_err(|e| failed(format!("{}: {e}", self.draft.display())))?;
         Ok(&self.draft)
+    }
+
+    /// Removes what processes that were ended have begun and left.
+    fn remove_leftovers(&self) {
+        let (Some(name), Ok(all)) = (self.folder.file_name(), std::fs::read_dir(cache())) else {
+            return;
+        };
+        let prefix = format!("{}.", name.to_string_lossy());
+        let running = Path::new("/proc");
+        if !running.join(std::process::id().to_string()).exists() {
+            return;
+        }
+        for found in all.flatten() {
+            let name = found.file_name().to_string_lossy().into_owned();
+            let process = name.strip_prefix(&prefix);
+            let process = process.and_then(|p| p.strip_suffix(".tmp")?.parse::<u32>().ok());
+            if process.is_some_and(|p| !running.join(p.to_string()).exists()) {
+                let _ = std::fs::remove_dir_all(found.path());
+            }
+        }
     }
 
     /// Forgets what was begun.
@@ -92,6 +118,14 @@ impl Entry {
             Err(e) => Err(failed(format!("{}: {e}", self.folder.display()))),
         }
     }
+}
+
+/// The files that the conversion in a folder was made of, as far as it got.
+pub fn layers(folder: &Path) -> Vec<PathBuf> {
+    let layers = std::fs::read(folder.join(LAYERS)).ok();
+    let layers = layers.and_then(|l| serde_json::from_slice::<Value>(&l).ok());
+    let layers = layers.as_ref().and_then(Value::as_object);
+    layers.map_or_else(Vec::new, |all| all.keys().map(PathBuf::from).collect())
 }
 
 /// The folder of all entries.

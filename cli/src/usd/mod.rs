@@ -63,6 +63,7 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     if let Some((scene, losses)) = entry.find() {
         hand_out(&scene.with_file_name(cache::REPORT), options)?;
         say(&losses);
+        crate::watch::reads(entry.layers());
         return Ok(scene);
     }
     let folder = entry.begin()?;
@@ -76,6 +77,7 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
     let said = String::from_utf8_lossy(&out.stderr);
     hand_out(&folder.join(cache::REPORT), options)?;
     if !out.status.success() {
+        crate::watch::reads(cache::layers(folder));
         entry.discard();
         // The converter's own words; its last line is the error.
         let (losses, error) = said.trim_end().rsplit_once('\n').unwrap_or(("", &said));
@@ -90,7 +92,9 @@ pub fn scene(stage: &Path, options: &Stage) -> Outcome<PathBuf> {
         });
     }
     say(&said);
-    entry.keep(&said)
+    let scene = entry.keep(&said)?;
+    crate::watch::reads(entry.layers());
+    Ok(scene)
 }
 
 /// Writes the report where it is asked for. A conversion that ended in an error has none.

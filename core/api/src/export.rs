@@ -603,16 +603,38 @@ macro_rules! export_plugin {
         compile_error!(
             "a plugin must be built with panic = \"unwind\": a panic would end the whole program instead of the render"
         );
-        /// The exported header.
+        $crate::__symbol! {
+            /// The exported header.
+            #[allow(non_upper_case_globals)]
+            pub static resolvent_plugin: $crate::abi::PluginHeader = {
+                static TABLE: $crate::abi::$table = $crate::export::$shim::<$t>::TABLE;
+                $crate::export::header::<$t>(
+                    $crate::abi::PluginKind::$kind,
+                    env!("CARGO_PKG_VERSION"),
+                    (&raw const TABLE).cast(),
+                )
+            };
+        }
+    };
+}
+
+/// Makes a header the symbol of its library, which only one in a program can be.
+#[cfg(not(feature = "linked"))]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __symbol {
+    ($header:item) => {
         #[unsafe(no_mangle)]
-        #[allow(non_upper_case_globals)]
-        pub static resolvent_plugin: $crate::abi::PluginHeader = {
-            static TABLE: $crate::abi::$table = $crate::export::$shim::<$t>::TABLE;
-            $crate::export::header::<$t>(
-                $crate::abi::PluginKind::$kind,
-                env!("CARGO_PKG_VERSION"),
-                (&raw const TABLE).cast(),
-            )
-        };
+        $header
+    };
+}
+
+/// The header as any other static.
+#[cfg(feature = "linked")]
+#[doc(hidden)]
+#[macro_export]
+macro_rules! __symbol {
+    ($header:item) => {
+        $header
     };
 }

@@ -117,7 +117,7 @@ fn data_uri(uri: &str) -> Fallible<Vec<u8>> {
 }
 
 /// A relative path from a URI; other schemes are not fetched.
-fn relative(uri: &str) -> Fallible<String> {
+pub(crate) fn relative(uri: &str) -> Fallible<String> {
     let scheme = uri.split_once(':').map(|(scheme, _)| scheme);
     if let Some(scheme) = scheme
         && scheme.len() > 1

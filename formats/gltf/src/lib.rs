@@ -30,12 +30,14 @@ mod expand;
 mod material;
 mod mesh;
 mod model;
+mod named;
 mod spot;
 mod values;
 
 pub use error::Error;
 pub use expand::{expand, has_models};
 pub use model::{Model, ModelCamera, ModelMesh};
+pub use named::{is_model, named_files};
 
 /// Extensions of glTF that have their effect.
 pub const EXTENSIONS: &[&str] = &container::EXTENSIONS;

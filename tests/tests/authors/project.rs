@@ -53,6 +53,12 @@ impl Project {
     /// folder, so `resolvent-api` is built once.
     #[track_caller]
     pub fn cargo(&self, command: &str) {
+        self.cargo_with(command, |_| {});
+    }
+
+    /// The same with whatever else is to be set.
+    #[track_caller]
+    pub fn cargo_with(&self, command: &str, set: impl Fn(&mut Command)) {
         static ONE: Mutex<()> = Mutex::new(());
         let _guard = ONE.lock().unwrap_or_else(|e| e.into_inner());
         let target = scratch().join("target");
@@ -70,6 +76,7 @@ impl Project {
             let mut c = Command::new(&cargo);
             c.args([command, "--release", "--quiet"]).args(more);
             c.current_dir(&self.folder);
+            set(&mut c);
             c
         };
         let offline = at(&["--offline"]).output();

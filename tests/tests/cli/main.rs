@@ -16,3 +16,5 @@ mod textures;
 mod tools;
 mod usd;
 mod volume;
+#[cfg(unix)]
+mod watch;

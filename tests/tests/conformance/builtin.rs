@@ -4,7 +4,7 @@ use super::program::{check, package, resolvent};
 use serde_json::Value;
 
 /// Parameters that some need to be anything at all.
-fn params(kind: &str, name: &str) -> Option<String> {
+pub fn params(kind: &str, name: &str) -> Option<String> {
     Some(match (kind, name) {
         ("bsdf", "conductor") => r#"{"metal": "Au"}"#.into(),
         ("phase", "tabulated") => r#"{"at": [-1, 0, 1], "values": [0.2, 0.1, 1]}"#.into(),

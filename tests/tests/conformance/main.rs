@@ -3,3 +3,5 @@
 mod broken;
 mod builtin;
 mod program;
+#[cfg(target_os = "linux")]
+mod races;

@@ -1,6 +1,8 @@
-//! What system and processor a library was built for, from its first bytes: the system's own message names neither.
+//! What system and processor a library was built for, from its first bytes, and whether all of it is there: the system's own message
+//! names neither, and a file that was cut off ends the program.
 
-use std::io::Read;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Bytes that are looked at: up to `e_machine` of an ELF header.
@@ -31,7 +33,7 @@ const OWN: (u16, u8) = if cfg!(target_arch = "x86_64") {
 /// loader.
 pub(super) fn check(path: &Path) -> Result<(), String> {
     let mut head = Vec::new();
-    let read = std::fs::File::open(path).and_then(|f| f.take(HEAD).read_to_end(&mut head));
+    let read = File::open(path).and_then(|f| f.take(HEAD).read_to_end(&mut head));
     if read.is_err() {
         return Ok(());
     }
@@ -56,7 +58,10 @@ pub(super) fn check(path: &Path) -> Result<(), String> {
     };
     let built_for = (machine, head[4]);
     if built_for == OWN {
-        return Ok(());
+        return match File::open(path).ok().and_then(missing) {
+            Some(bytes) => Err(format!("{bytes} bytes at its end are missing")),
+            None => Ok(()),
+        };
     }
     let name = |(machine, width): (u16, u8)| {
         PROCESSORS
@@ -72,4 +77,37 @@ pub(super) fn check(path: &Path) -> Result<(), String> {
         name(built_for),
         name(OWN)
     ))
+}
+
+/// How many bytes of the parts of a 64-bit ELF file that are loaded lie beyond its end, if any do.
+fn missing(mut file: File) -> Option<u64> {
+    const LOADED: u32 = 1; // PT_LOAD
+    const ENTRY: usize = 56; // sizeof(Elf64_Phdr)
+    let size = file.metadata().ok()?.len();
+    let mut head = [0; 64];
+    if file.read_exact(&mut head).is_err() {
+        return Some(64 - size.min(64)).filter(|n| *n > 0);
+    }
+    let word = |at: &[u8]| at.try_into().map(u64::from_ne_bytes);
+    let half = |at: &[u8]| at.try_into().map(u16::from_ne_bytes);
+    let (table, entry, count) = (
+        word(&head[32..40]).ok()?,
+        half(&head[54..56]).ok()?,
+        half(&head[56..58]).ok()?,
+    );
+    // Another layout is the loader's business.
+    if usize::from(entry) != ENTRY {
+        return None;
+    }
+    file.seek(SeekFrom::Start(table)).ok()?;
+    let mut parts = Vec::new();
+    let length = ENTRY * usize::from(count);
+    file.take(length as u64).read_to_end(&mut parts).ok()?;
+    let ends = parts.chunks_exact(ENTRY).filter_map(|p| {
+        let loaded = p[..4] == LOADED.to_ne_bytes();
+        let end = word(&p[8..16]).ok()?.checked_add(word(&p[32..40]).ok()?)?;
+        loaded.then_some(end)
+    });
+    let end = ends.chain([table.checked_add(length as u64)?]).max()?;
+    end.checked_sub(size).filter(|n| *n > 0)
 }

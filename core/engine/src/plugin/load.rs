@@ -1,6 +1,6 @@
 //! Opening one shared library: the header is checked before anything else of it is used.
 
-use super::declare;
+use super::{copy, declare};
 use crate::error::{Error, Result};
 use resolvent_api::abi::{ABI_MAJOR, MAGIC, PluginHeader, PluginKind, SYMBOL};
 use resolvent_scene::PluginDecl;
@@ -26,6 +26,22 @@ impl Plugin {
     /// # Errors
     /// If it is no library, no plugin, or one of another ABI version; the message says which side to update.
     pub fn open(path: &Path) -> Result<Self> {
+        Self::map(path, |load| Ok(load(path)))
+    }
+
+    /// The same from a copy, so that the file may be overwritten while the plugin is in use.
+    ///
+    /// # Errors
+    /// As [`Plugin::open`].
+    pub fn open_copy(path: &Path) -> Result<Self> {
+        Self::map(path, |load| copy::with(path, load))
+    }
+
+    /// Loads the library from the file that `with` calls its argument with.
+    fn map(
+        path: &Path,
+        with: impl FnOnce(fn(&Path) -> Mapped) -> std::io::Result<Mapped>,
+    ) -> Result<Self> {
         let fail = |why: String| Error::Plugin(format!("{}: {why}", path.display()));
         match std::fs::metadata(path) {
             Err(e) => return Err(fail(format!("cannot be opened ({e})"))),
@@ -38,13 +54,13 @@ impl Plugin {
                 "is no shared library that can be loaded here: {why}"
             ))
         })?;
-        // SAFETY: loading a library runs its initialisers; a plugin is code that the user chose to run.
-        let library = unsafe { libloading::Library::new(path) }.map_err(|e| {
-            let why = reason(&e, path);
-            fail(format!(
-                "is no shared library that can be loaded here ({why})"
-            ))
-        })?;
+        let library = with(load)
+            .map_err(|e| fail(format!("cannot be copied ({e})")))?
+            .map_err(|why| {
+                fail(format!(
+                    "is no shared library that can be loaded here ({why})"
+                ))
+            })?;
         // SAFETY: the symbol is only used as an address here; what it points to is checked field by field.
         let symbol = unsafe { library.get::<*const u8>(SYMBOL.as_bytes()) }.map_err(|_| {
             fail(format!(
@@ -148,6 +164,14 @@ impl Plugin {
             self.path.display()
         )
     }
+}
+
+/// A library, or why it is none.
+type Mapped = std::result::Result<libloading::Library, String>;
+
+fn load(file: &Path) -> Mapped {
+    // SAFETY: loading a library runs its initialisers; a plugin is code that the user chose to run.
+    unsafe { libloading::Library::new(file) }.map_err(|e| reason(&e, file))
 }
 
 /// The system's reason without the path, which the message already has. Other files in it stay: a library that this one needs

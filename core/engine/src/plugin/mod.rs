@@ -1,5 +1,6 @@
 //! Plugins: finding, loading, declaring, making instances, and calling them through the ordinary traits' shapes.
 
+mod copy;
 mod declare;
 mod foreign;
 mod host;

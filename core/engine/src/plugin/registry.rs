@@ -20,6 +20,7 @@ pub struct Registry {
     /// Plugins that are part of the program.
     linked: Vec<Arc<Plugin>>,
     loaded: Mutex<BTreeMap<PathBuf, Arc<Plugin>>>,
+    copies: bool,
 }
 
 /// A library in the search path whose name is that of a plugin.
@@ -60,11 +61,20 @@ impl Registry {
             folders,
             linked: Vec::new(),
             loaded: Mutex::default(),
+            copies: false,
         }
     }
 
-    /// Adds a plugin that is linked into the program, by the header that its library would export: it comes before all in the search
-    /// path.
+    /// Loads libraries from copies, so that their files may be overwritten while they are in use.
+    pub fn copying(self) -> Self {
+        Self {
+            copies: true,
+            ..self
+        }
+    }
+
+    /// Adds a plugin that is linked into the program, by the header that its library would export (with the feature `linked` of
+    /// `resolvent-api`, so that there can be several): it comes before all in the search path.
     ///
     /// # Errors
     /// As for one that is loaded.
@@ -86,6 +96,13 @@ impl Registry {
             kind.name(),
             name.replace('-', "_")
         )
+    }
+
+    /// Where the libraries of the plugins of a name would be, of any kind, whether there is one or not.
+    pub fn places(&self, name: &str) -> impl Iterator<Item = PathBuf> {
+        let files = PluginKind::ALL.map(|kind| Self::file_name(kind, name));
+        let folders = self.folders.iter();
+        folders.flat_map(move |folder| files.clone().map(|file| folder.join(file)))
     }
 
     /// Every library in the search path whose name is that of a plugin, the first of each name only, without loading any.
@@ -215,7 +232,12 @@ impl Registry {
         if let Some(plugin) = loaded.get(&key) {
             return Ok(plugin.clone());
         }
-        let plugin = Arc::new(Plugin::open(path)?);
+        let plugin = if self.copies {
+            Plugin::open_copy(path)?
+        } else {
+            Plugin::open(path)?
+        };
+        let plugin = Arc::new(plugin);
         loaded.insert(key, plugin.clone());
         Ok(plugin)
     }

@@ -142,12 +142,7 @@ mod tests {
     use resolvent_api::rng::Stream;
 
     fn segment(o: [f32; 3], d: [f32; 3], t1: f32) -> Segment {
-        Segment {
-            o,
-            d,
-            t0: 0.0,
-            t1,
-        }
+        Segment { o, d, t0: 0.0, t1 }
     }
 
     /// Every medium whose bounds a segment meets is found, whatever the bounds, and few others.
