@@ -53,7 +53,6 @@ mod nearest;
 mod parse;
 mod plugin;
 mod read;
-mod read_texture;
 mod reference;
 mod schema;
 pub mod table;

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import area_vectors
-from resolvent_usd.geometry import subdivide
+from resolvent_usd.geometry import loop, subdivide
 from resolvent_usd.geometry.cage import INFINITE, Cage, following
 from resolvent_usd.geometry.normals import smooth_normals
 from resolvent_usd.geometry.primvars import Topology
@@ -91,13 +91,13 @@ def test_boundary_is_a_cubic_b_spline_that_ends_at_corners() -> None:
     assert np.allclose(subdivide.limit(subdivide.step(c)).data[0], (points[1] + 4 * points[0] + points[4]) / 6)
 
 
-def loop(z: int) -> list:
+def ring(z: int) -> list:
     a, b, c, d = (4 * z + i for i in (0, 1, 3, 2))
     return [(a, b), (b, c), (c, d), (d, a)]
 
 
 def test_infinite_crease_is_its_own_b_spline() -> None:
-    c = cage(CUBE, FACES, loop(1), [10.0] * 4)
+    c = cage(CUBE, FACES, ring(1), [10.0] * 4)
     for _ in range(3):
         c = subdivide.step(c)
     c = subdivide.limit(c)
@@ -110,14 +110,14 @@ def test_infinite_crease_is_its_own_b_spline() -> None:
 def test_semi_sharp_crease_by_hand() -> None:
     """Sharpness 0.5 on one loop: edge points are half way between the smooth and the sharp rule, and so are vertices."""
     smooth = subdivide.step(cage(CUBE, FACES)).data
-    sharp = subdivide.step(cage(CUBE, FACES, loop(1), [10.0] * 4)).data
-    half = subdivide.step(cage(CUBE, FACES, loop(1), [0.5] * 4)).data
+    sharp = subdivide.step(cage(CUBE, FACES, ring(1), [10.0] * 4)).data
+    half = subdivide.step(cage(CUBE, FACES, ring(1), [0.5] * 4)).data
     assert np.allclose(half, 0.5 * (smooth + sharp))
     # Sharpness 1 is sharp for one level and smooth from then on.
-    one = subdivide.step(cage(CUBE, FACES, loop(1), [1.0] * 4))
+    one = subdivide.step(cage(CUBE, FACES, ring(1), [1.0] * 4))
     assert np.allclose(one.data, sharp) and not one.edges.sharpness.any()
     # 1.5: sharp, then half.
-    two = subdivide.step(cage(CUBE, FACES, loop(1), [1.5] * 4))
+    two = subdivide.step(cage(CUBE, FACES, ring(1), [1.5] * 4))
     assert np.allclose(two.data, sharp) and sorted(two.edges.sharpness)[-9:] == [0] + [0.5] * 8
 
 
@@ -125,7 +125,7 @@ def test_edges_are_those_of_the_faces() -> None:
     """The edges that a level hands on are the ones that a search finds."""
     points, faces = grid(4)
     mixed = [*faces[1:], [0, 1, 5], [0, 5, 4]]
-    for mesh in (cage(CUBE, FACES, loop(1), [2.5] * 4), cage(points, mixed)):
+    for mesh in (cage(CUBE, FACES, ring(1), [2.5] * 4), cage(points, mixed)):
         fine = subdivide.step(subdivide.step(mesh))
         known = fine.edges
         ends = np.sort(np.stack([fine.indices, fine.indices[following(fine.counts)]], axis=1), axis=1)
@@ -151,7 +151,7 @@ def test_darts_and_corners() -> None:
 
 
 def test_normals_break_at_sharp_edges_only() -> None:
-    c = cage(CUBE, FACES, loop(1), [10.0] * 4)
+    c = cage(CUBE, FACES, ring(1), [10.0] * 4)
     for _ in range(2):
         c = subdivide.step(c)
     normals, which = smooth_normals(c, c.data)
@@ -221,24 +221,18 @@ def test_corners_of_a_point_with_equal_values_are_one(kinds: int) -> None:
     assert sorted(places.values()) == first.tolist()
 
 
-def test_loop_subdivision_is_reported(convert_text) -> None:
-    triangles = MESH.replace("[4, 4, 4, 4]", "[3, 3]").replace("[0, 1, 4, 3, 1, 2, 5, 4, 3, 4, 7, 6, 4, 5, 8, 7]", "[0, 1, 4, 0, 4, 3]")
-    found = convert_text(triangles % 'uniform token subdivisionScheme = "loop"')
-    (loss,) = [x for x in found.report.losses if x.path == "/m"]
-    assert (loss.kind, loss.what) == ("approximated", "subdivisionScheme") and "Loop" in loss.reason
-
-
-@pytest.mark.parametrize("level", [1, 3])
-def test_texture_coordinates_follow_creases(convert_text, level: int) -> None:
+@pytest.mark.parametrize(("level", "scheme"), [(1, "catmullClark"), (3, "catmullClark"), (1, "loop"), (2, "loop")])
+def test_texture_coordinates_follow_creases(convert_text, level: int, scheme: str) -> None:
     """Coordinates that are the positions stay the positions, over semi-sharp creases and corners as well (OpenSubdiv's rule for
     face-varying data that are continuous)."""
     rng = np.random.default_rng(4)
-    points, faces = grid(5)
+    points, faces = grid(5) if scheme == "catmullClark" else triangles(5)
     points += rng.uniform(-0.3, 0.3, points.shape)
     corners = np.concatenate(faces)
     found = convert_text(
         f"""def Mesh "m" (prepend apiSchemas = ["MaterialBindingAPI"]) {{
-    int[] faceVertexCounts = {[4] * len(faces)}
+    int[] faceVertexCounts = {[len(f) for f in faces]}
+    uniform token subdivisionScheme = "{scheme}"
     int[] faceVertexIndices = {corners.tolist()}
     point3f[] points = {[tuple(p) for p in points.tolist()]}
     int[] creaseIndices = [6, 7, 8, 13, 12, 11]
@@ -262,3 +256,94 @@ def test_texture_coordinates_follow_creases(convert_text, level: int) -> None:
     )
     (mesh,) = found.meshes()
     assert np.abs(mesh["TEXCOORD_0"] - mesh["POSITION"][:, :2]).max() < 2e-6
+
+
+def triangles(n: int) -> tuple[np.ndarray, list]:
+    """A grid whose interior vertices have six neighbours."""
+    points, quads = grid(n)
+    return points, [half for a, b, c, d in quads for half in ([a, b, c], [a, c, d])]
+
+
+def refined(mesh: Cage, level: int) -> Cage:
+    for _ in range(level):
+        mesh = loop.step(mesh)
+    return mesh
+
+
+def test_loop_on_a_regular_grid_is_a_box_spline() -> None:
+    """The quartic box spline reproduces linear functions, and x² but for a constant: (Σ dx²)/12 over the six neighbours, 1/3."""
+    points, faces = triangles(8)
+    points[:, 2] = points[:, 0] ** 2
+    for level in (1, 3):
+        p = loop.limit(refined(cage(points, faces), level)).data
+        inside = ((p[:, :2] > 2) & (p[:, :2] < 5)).all(axis=1)
+        assert inside.sum() >= 9 and np.allclose(p[inside, 2], p[inside, 0] ** 2 + 1 / 3, atol=1e-12)
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 7])
+def test_loop_limits_do_not_depend_on_the_level(n: int) -> None:
+    """(1 − n χ) v + χ Σ over the n neighbours, with χ = 1/(n + 3/(8 β)) and Loop's β, on the control mesh."""
+    turn = 2 * np.pi * np.arange(n) / n
+    points = np.concatenate([[[0, 0, 1.0]], np.stack([np.cos(turn), np.sin(turn), 0.3 * np.cos(3 * turn)], axis=1), [[0.2, 0, -1]]])
+    k = np.arange(n) + 1
+    after = np.roll(k, -1)
+    faces = [[0, i, j] for i, j in zip(k, after, strict=True)] + [[n + 1, j, i] for i, j in zip(k, after, strict=True)]
+    beta = (5 / 8 - (3 / 8 + np.cos(2 * np.pi / n) / 4) ** 2) / n
+    chi = 1 / (n + 3 / (8 * beta))
+    expected = (1 - n * chi) * points[0] + chi * points[1 : n + 1].sum(axis=0)
+    for level in range(4):
+        fine = refined(cage(points, faces), level)
+        assert len(fine.counts) == 2 * n * 4**level and np.allclose(loop.limit(fine).data[0], expected, atol=1e-12)
+        if level:
+            normals, which = smooth_normals(fine, fine.data)
+            assert which is fine.indices and np.allclose(np.linalg.norm(normals, axis=1), 1) and normals[0, 2] > 0.5
+
+
+def test_loop_boundaries_and_creases_are_cubic_b_splines() -> None:
+    points, faces = triangles(4)
+    points[:4, 2] = [0, 1, 3, 0]
+    fine = loop.limit(refined(cage(points, faces), 2)).data
+    assert np.allclose(fine[1], (points[0] + 4 * points[1] + points[2]) / 6)
+    crease = [(5, 6), (6, 7), (4, 5)]
+    sharp = loop.limit(refined(cage(points, faces, crease, [10.0] * 3), 2)).data
+    assert np.allclose(sharp[5], (points[4] + 4 * points[5] + points[6]) / 6)
+    smooth, hard = (loop.step(cage(points, faces, crease, [s] * 3)).data for s in (0.0, 10.0))
+    assert np.allclose(loop.step(cage(points, faces, crease, [0.5] * 3)).data, 0.5 * (smooth + hard))
+
+
+def test_loop_edges_and_normals() -> None:
+    """The edges that a level hands on are the ones that a search finds; normals break at the crease, the line y = 1."""
+    points, faces = triangles(4)
+    fine = refined(cage(points, faces, [(4, 5), (5, 6), (6, 7)], [10.0] * 3), 2)
+    known = fine.edges
+    ends = np.sort(np.stack([fine.indices, fine.indices[following(fine.counts)]], axis=1), axis=1)
+    assert np.array_equal(np.sort(known.ends[known.of_corner], axis=1), ends)
+    assert len(np.unique(ends, axis=0)) == len(known.ends) and np.array_equal(np.bincount(known.of_corner), known.faces)
+    _, which = smooth_normals(fine, fine.data)
+    at: dict[int, set[int]] = {}
+    for point, n in zip(fine.indices, which, strict=True):
+        at.setdefault(int(point), set()).add(int(n))
+    on_crease = np.abs(fine.data[:, 1] - 1) < 1e-9
+    assert on_crease.sum() == 13 and all(len(sectors) == (2 if on_crease[i] else 1) for i, sectors in at.items())
+
+
+def test_loop_of_stages(convert_text) -> None:
+    """Triangles are refined without any loss; other faces make it Catmull and Clark's, which is said."""
+    points, faces = triangles(4)
+    text = f"""def Mesh "m" {{
+    int[] faceVertexCounts = {[3] * len(faces)}
+    int[] faceVertexIndices = {np.concatenate(faces).tolist()}
+    point3f[] points = {[tuple(p) for p in points.tolist()]}
+    uniform token subdivisionScheme = "loop"
+    color3f[] primvars:displayColor = {[(0.5, i / len(points), 0) for i in range(len(points))]} (interpolation = "varying")
+}}"""
+    found = convert_text(text, subdivision=2)
+    (mesh,) = found.meshes()
+    assert len(mesh["triangles"]) == len(faces) * 16 and found.losses("/m") == []
+    assert (area_vectors(mesh)[:, 2] > 0).all() and mesh["NORMAL"][:, 2].min() > 0.99
+    # Varying values are linear within the faces: at a corner of one face, which stays where it is, its own value.
+    corner = np.abs(mesh["POSITION"][:, :2] - [3, 0]).max(axis=1) < 1e-6
+    assert corner.any() and np.allclose(mesh["COLOR_0"][corner, 1], 3 / 16)
+    mixed = convert_text(MESH % 'uniform token subdivisionScheme = "loop"')
+    (loss,) = [x for x in mixed.report.losses if x.path == "/m"]
+    assert (loss.kind, loss.what) == ("approximated", "subdivisionScheme") and "triangles" in loss.reason

@@ -49,10 +49,14 @@ class Cage:
     face: Ints
     """The face of the first cage that each face comes from."""
     before: Cage | None = None
-    """The cage that this one is the next level of: then the creases are in its edges."""
+    """The cage that this one is the next level of, by Catmull and Clark: then the creases are in its edges."""
+    known: Edges | None = None
+    """The edges, if they are known: then the creases are in them."""
 
     @cached_property
     def edges(self) -> Edges:
+        if self.known is not None:
+            return self.known
         return _child_edges(self.before) if self.before is not None else _find_edges(self)
 
     @property
@@ -154,19 +158,26 @@ def _find_edges(cage: Cage) -> Edges:
     return Edges(np.stack([keys >> bits, keys & ((1 << bits) - 1)], axis=1), of_corner, faces, sharpness)
 
 
+def halved(edges: Edges, v: int) -> Ints:
+    """Ends of both halves of each edge, the one at its first end first; the middles follow v vertices."""
+    return np.stack([edges.ends.reshape(-1), np.repeat(v + np.arange(len(edges.ends)), 2)], axis=1)
+
+
+def half_at(edges: Edges, edge: Ints, vertex: Ints) -> Ints:
+    """The half of an edge that ends at a vertex."""
+    return np.asarray(2 * edge + (vertex == edges.ends[edge, 1]))
+
+
 def _child_edges(cage: Cage) -> Edges:
     """The edges after a level: two halves of each, and from each edge's point to the points of its faces."""
     edges = cage.edges
     v, e, corners = len(cage.data), len(edges.ends), len(cage.indices)
-    halves = np.stack([edges.ends.reshape(-1), np.repeat(v + np.arange(e), 2)], axis=1)
+    halves = halved(edges, v)
     inner = np.stack([v + edges.of_corner, v + e + of_faces(cage.counts, np.arange(len(cage.counts)))], axis=1)
 
-    def half(edge: Ints) -> Ints:
-        """The half of an edge that ends at the corner's vertex."""
-        return np.asarray(2 * edge + (cage.indices == edges.ends[edge, 1]))
-
     across = 2 * e + np.arange(corners)
-    sides = [half(edges.of_corner), across, behind(cage.counts, across), half(behind(cage.counts, edges.of_corner))]
+    before = behind(cage.counts, edges.of_corner)
+    sides = [half_at(edges, edges.of_corner, cage.indices), across, behind(cage.counts, across), half_at(edges, before, cage.indices)]
     return Edges(
         ends=np.concatenate([halves, inner]),
         of_corner=np.stack(sides, axis=1).reshape(-1),

@@ -86,10 +86,9 @@ def _surface(ctx: Context, claim: Claim, topology: Topology, points: NDArray[Any
     normals = _normals(claim, topology, scheme)
     if scheme not in ("none", "catmullClark", "bilinear", "loop"):
         raise InputError(f"{claim.path}.subdivisionScheme", f"is '{scheme}', which is no scheme")
-    if scheme == "loop":
-        claim.approximated(
-            "subdivisionScheme", "Loop subdivision is not there", "Catmull–Clark subdivision rounds the same cage a little differently"
-        )
+    if scheme == "loop" and topology.counts.max() > 3:
+        claim.approximated("subdivisionScheme", "Loop subdivision is for triangles, and the mesh has other faces", "it is that of Catmull and Clark")
+        scheme = "catmullClark"
     holes = claim.array("holeIndices", np.int64)
     if holes is not None and len(holes) and (holes.min() < 0 or holes.max() >= len(topology.counts)):
         raise InputError(f"{claim.path}.holeIndices", f"names a face that is not there; there are {len(topology.counts)}")

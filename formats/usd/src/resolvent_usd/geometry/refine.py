@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..claim import Claim
 from ..context import Context
-from . import primvars, subdivide
+from . import loop, primvars, subdivide
 from .cage import INFINITE, Cage, following, sharp_edges
 from .glb import Triangles
 from .normals import smooth_normals
@@ -97,6 +98,7 @@ def refine(
         shown[holes] = False
     level = 0 if scheme == "none" else ctx.options.subdivision
     rules = _Rules.read(claim)
+    claim.take("triangleSubdivisionRule")
     if scheme == "none" or level == 0:
         if scheme != "none":
             claim.approximated("subdivisionScheme", "--subdivision 0", "the control cage is shown")
@@ -105,17 +107,20 @@ def refine(
             None if normals is None else _unit(_flat(normals, topology)),
             lambda name, width: _polygon_data(claim, name, width, topology),
         )  # fmt: skip
+    if claim.get("triangleSubdivisionRule") == "smooth" and scheme == "catmullClark" and topology.counts.min() == 3:
+        claim.approximated("triangleSubdivisionRule", "only catmullClark is there", "triangles are rounded a little differently")
     smooth = scheme != "bilinear"
     cage = rules.cage(topology, points)
     if smooth and rules.boundary == "none":
         shown &= ~_touches_boundary(topology)
+    how = loop if scheme == "loop" else subdivide
     for _ in range(level):
-        cage = subdivide.step(cage, smooth)
+        cage = how.step(cage) if smooth else subdivide.step(cage, smooth=False)
     if smooth:
-        cage = subdivide.limit(cage)
+        cage = how.limit(cage)
     surface = Surface(
         _single(cage.data), cage.counts, cage.indices, cage.face, shown[cage.face], flipped,
-        None, lambda name, width: _subdivided_data(claim, name, width, topology, rules, level, smooth),
+        None, lambda name, width: _subdivided_data(claim, name, width, topology, rules, level, how if smooth else None),
     )  # fmt: skip
     if smooth:
         values, which = smooth_normals(cage, cage.data)
@@ -146,9 +151,6 @@ class _Rules:
             value = claim.array(name)
             return np.empty(0) if value is None else value
 
-        claim.take("triangleSubdivisionRule")
-        if claim.get("triangleSubdivisionRule") == "smooth":
-            claim.approximated("triangleSubdivisionRule", "only catmullClark is there", "triangles are rounded a little differently")
         lengths, sharpness, indices = ints("creaseLengths"), floats("creaseSharpnesses"), ints("creaseIndices")
         points = claim.array("points", np.float32, 3)
         count = 0 if points is None else len(points)
@@ -261,26 +263,27 @@ def _polygon_data(claim: Claim, name: str, width: int, topology: Topology) -> tu
 
 
 def _subdivided_data(
-    claim: Claim, name: str, width: int, topology: Topology, rules: _Rules, level: int, smooth: bool
+    claim: Claim, name: str, width: int, topology: Topology, rules: _Rules, level: int, scheme: ModuleType | None
 ) -> tuple[Array, Ints] | None:
     """A primvar on a subdivision surface: vertex data is smoothed like points, varying data is linear, faceVarying data
-    follows faceVaryingLinearInterpolation."""
+    follows faceVaryingLinearInterpolation; without a scheme all is linear."""
     found = _data_primvar(claim, name, width, topology)
     if found is None:
         return None
     values, which = _flat(found, topology)
-    if found.interpolation == "vertex" and smooth:
+    how = scheme or subdivide
+    if found.interpolation == "vertex" and scheme:
         cage = rules.cage(topology, values)
-    elif found.interpolation == "faceVarying" and smooth and rules.face_varying != "all":
+    elif found.interpolation == "faceVarying" and scheme and rules.face_varying != "all":
         cage = _face_varying_cage(topology, values, rules)
     else:
         counts, corners = topology.counts, np.ascontiguousarray(values[which].T, dtype=float)
         for _ in range(level):
-            corners, counts = subdivide.linear(counts, corners), np.full(corners.shape[1], 4)
+            counts, corners = how.linear(counts, corners)
         return _single(corners.T), np.arange(corners.shape[1])
     for _ in range(level):
-        cage = subdivide.step(cage)
-    cage = subdivide.limit(cage)
+        cage = how.step(cage)
+    cage = how.limit(cage)
     return _single(cage.data), cage.indices
 
 

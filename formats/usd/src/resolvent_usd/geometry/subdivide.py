@@ -11,93 +11,31 @@ and need no search.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from .cage import Bools, Cage, Edges, Floats, Ints, ahead_of, behind, decayed, face_sums, of_faces, sum_at
-
-
-@dataclass(frozen=True)
-class _Rules:
-    """Vertices that are not smooth, at one sharpness of edges and corners."""
-
-    sharp: Bools
-    """Of edges."""
-    corner: Bools
-    crease: Bools
-
-    @staticmethod
-    def of(edges: Edges, edge_sharpness: Floats, corner_sharpness: Floats) -> _Rules:
-        sharp = edge_sharpness > 0
-        degree = np.bincount(edges.ends[sharp].reshape(-1), minlength=len(corner_sharpness))
-        corner = (corner_sharpness > 0) | (degree > 2)
-        return _Rules(sharp, corner, ~corner & (degree == 2))
-
-    @property
-    def special(self) -> bool:
-        return bool(self.corner.any() or self.crease.any())
-
-
-def _around_sharp(edges: Edges, sharp: Bools, p: Floats) -> Floats:
-    """For each vertex the sum of the other ends of its sharp edges."""
-    e = edges.ends[sharp]
-    return sum_at(e[:, 0], p[:, e[:, 1]], p.shape[1]) + sum_at(e[:, 1], p[:, e[:, 0]], p.shape[1])
-
-
-def _vertex_points(cage: Cage, p: Floats, face_values: Floats) -> Floats:
-    """Where one level moves the vertices; ``face_values`` are the faces' points, at their corners."""
-    edges, size = cage.edges, p.shape[1]
-    a, b = edges.ends.T.copy()
-    degree = np.bincount(a, minlength=size) + np.bincount(b, minlength=size)
-    n = np.maximum(degree, 1).astype(float)
-    neighbours = sum_at(a, p[:, b], size) + sum_at(b, p[:, a], size)
-    smooth: Floats = p * ((n - 2.0) / n) + (neighbours + sum_at(cage.indices, face_values, size)) / (n * n)
-
-    def under(rules: _Rules) -> Floats:
-        if not rules.special:
-            return smooth
-        crease = 0.75 * p + 0.125 * _around_sharp(edges, rules.sharp, p)
-        return np.asarray(np.where(rules.corner, p, np.where(rules.crease, crease, smooth)))
-
-    now = _Rules.of(edges, edges.sharpness, cage.corner_sharpness)
-    moved = under(now)
-    if now.special:
-        child_edges, child_corners = decayed(edges.sharpness), decayed(cage.corner_sharpness)
-        then = _Rules.of(edges, child_edges, child_corners)
-        changes = (now.corner != then.corner) | (now.crease != then.crease)
-        if changes.any():
-            # The mean sharpness of what becomes smooth in this level says how much of the old rule is left.
-            ending = (edges.sharpness > 0) & (child_edges <= 0)
-            e = edges.ends[ending]
-            weight, count = np.zeros(size), np.zeros(size)
-            for column in (0, 1):
-                weight += np.bincount(e[:, column], weights=edges.sharpness[ending], minlength=size)
-                count += np.bincount(e[:, column], minlength=size)
-            corner_ends = (cage.corner_sharpness > 0) & (child_corners <= 0)
-            weight += np.where(corner_ends, cage.corner_sharpness, 0.0)
-            count += corner_ends
-            w = np.minimum(weight / np.maximum(count, 1), 1.0)
-            moved = np.where(changes & (count > 0), w * moved + (1.0 - w) * under(then), moved)
-    # What no face uses stays where it is.
-    return np.asarray(np.where(degree > 0, moved, p)) if (degree == 0).any() else moved
+from . import creases
+from .cage import Cage, Floats, Ints, ahead_of, behind, decayed, face_sums, of_faces, sum_at
 
 
 def step(cage: Cage, smooth: bool = True) -> Cage:
     """One level: a face of n corners becomes n quadrilaterals. ``smooth`` false is bilinear subdivision."""
     edges, counts, p = cage.edges, cage.counts, cage.columns
     v, e, f = p.shape[1], len(edges.ends), len(counts)
+    a, b = edges.ends.T.copy()
     face_points = face_sums(counts, p[:, cage.indices]) / counts
-    edge_points = 0.5 * (p[:, edges.ends[:, 0]] + p[:, edges.ends[:, 1]])
-    vertex_points = p
+    middles = 0.5 * (p[:, a] + p[:, b])
     if smooth:
         face_values = of_faces(counts, face_points)
-        rounded = 0.5 * edge_points + 0.25 * sum_at(edges.of_corner, face_values, e)
-        at = np.flatnonzero(edges.sharpness > 0.0)
-        share = np.minimum(edges.sharpness[at], 1.0)
-        rounded[:, at] = np.where(share >= 1.0, edge_points[:, at], share * edge_points[:, at] + (1.0 - share) * rounded[:, at])
-        edge_points = rounded
-        vertex_points = _vertex_points(cage, p, face_values)
+        beside = creases.edge_points(edges, middles, 0.5 * middles + 0.25 * sum_at(edges.of_corner, face_values, e))
+        degree = np.bincount(a, minlength=v) + np.bincount(b, minlength=v)
+        n = np.maximum(degree, 1).astype(float)
+        neighbours = sum_at(a, p[:, b], v) + sum_at(b, p[:, a], v)
+        rounded: Floats = p * ((n - 2.0) / n) + (neighbours + sum_at(cage.indices, face_values, v)) / (n * n)
+        points = [creases.vertex_points(cage, p, rounded, degree), beside, face_points]
+    else:
+        points = [p, middles, face_points]
     quads = np.empty((len(cage.indices), 4), dtype=np.int64)
     quads[:, 0] = cage.indices
     quads[:, 1] = v + edges.of_corner
@@ -106,7 +44,7 @@ def step(cage: Cage, smooth: bool = True) -> Cage:
     return Cage(
         counts=np.full(len(quads), 4),
         indices=quads.reshape(-1),
-        data=np.concatenate([vertex_points, edge_points, face_points], axis=1).T,
+        data=np.concatenate(points, axis=1).T,
         crease_edges=np.empty((0, 2), dtype=np.int64),
         crease_sharpness=np.empty(0),
         corner_sharpness=np.concatenate([decayed(cage.corner_sharpness), np.zeros(e + f)]),
@@ -115,11 +53,12 @@ def step(cage: Cage, smooth: bool = True) -> Cage:
     )
 
 
-def linear(counts: Ints, values: Floats) -> Floats:
-    """One level of values (k, corners) that are interpolated linearly within each face: those of the quadrilaterals' corners."""
+def linear(counts: Ints, values: Floats) -> tuple[Ints, Floats]:
+    """One level of values (k, corners) that are interpolated linearly within each face: the new faces' corners and values."""
     ahead = 0.5 * (values + ahead_of(counts, values))
     centre = of_faces(counts, face_sums(counts, values) / counts)
-    return np.stack([values, ahead, centre, behind(counts, ahead)], axis=-1).reshape(len(values), -1)
+    out = np.stack([values, ahead, centre, behind(counts, ahead)], axis=-1).reshape(len(values), -1)
+    return np.full(values.shape[1], 4), out
 
 
 def limit(cage: Cage) -> Cage:

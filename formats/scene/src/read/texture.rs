@@ -2,11 +2,12 @@
 
 use indexmap::IndexMap;
 
+use super::Reader;
+use super::values::{flag, floats, number, spectrum, text};
 use crate::base64;
 use crate::describe::Material;
 use crate::json::{Node, quoted};
 use crate::nearest::hint;
-use crate::read::{Reader, flag, floats, number, spectrum, text};
 use crate::texture::*;
 
 impl Reader<'_> {
