@@ -204,7 +204,7 @@ mod tests {
         let scene = r#"{"resolvent": 1,
             "camera": {"type": "perspective", "origin": [0, 0, 4], "target": [0, 0, 0], "fov_x_deg": 40},
             "film": {"resolution": [8, 8]}, "integrator": {"plugin": "./own.so"},
-            "lights": [{"type": "environment", "file": "sky.exr"}],
+            "lights": [{"type": "environment", "image": "sky.exr"}],
             "textures": {"skin": {"file": "skin.<UDIM>.png"}},
             "materials": {"m": {"plugin": "mix", "params": {"a": "diffuse", "b": {"plugin": "gold"}}}},
             "media": {"c": {"plugin": "vdb", "params": {"file": "cloud.vdb"}}},
