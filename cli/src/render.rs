@@ -118,7 +118,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         }
     };
     seconds.render = rendered.seconds;
-    warn_about(&rendered, &built, &integrator);
+    warn_about(&rendered, &built);
     let interrupted = rendered.interrupted;
     if interrupted && stats::total_samples(&rendered) == 0 {
         return Err(failed(
@@ -308,23 +308,13 @@ fn violated(scene: &Scene) -> String {
 }
 
 /// What may make the picture wrong.
-fn warn_about(rendered: &Rendered, scene: &Scene, integrator: &ForeignIntegrator) {
+fn warn_about(rendered: &Rendered, scene: &Scene) {
     let c = &rendered.counters;
     if c.violations > 0 {
         console::warning(format!(
             "the extinction was above its majorant at {} points{}: a fault of the plugin. Ratio tracking allows for it, free flights cannot: the picture may be wrong",
             c.violations,
             violated(scene)
-        ));
-    }
-    if c.rejected > 0 {
-        let at = rendered.rejected_at.map_or_else(String::new, |[x, y]| {
-            format!(", the first at pixel ({x}, {y})")
-        });
-        console::warning(format!(
-            "{} samples of the {} were not finite and count as black{at}",
-            c.rejected,
-            integrator.title()
         ));
     }
 }

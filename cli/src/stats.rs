@@ -256,8 +256,6 @@ fn figures(run: &Run) -> Value {
             "collisions": {"real": c.collisions, "null": c.nulls},
             "lookups": c.lookups,
             "majorant_violations": c.violations,
-            "rejected_samples": c.rejected,
-            "rejected_at": r.rejected_at,
         },
         "seconds": {
             "parse": s.parse,

@@ -139,12 +139,6 @@ pub fn thorough(suite: &mut Suite, subject: &Subject, v: &Variant, stages: Stage
         });
         let Ok((whole, stage)) = whole else { continue };
         suite.about(property::SAMPLES);
-        suite.at_most(whole.counters.rejected as f64, 0.0, || {
-            format!(
-                "{what}: samples that are not finite, first in pixel {:?}",
-                whole.rejected_at
-            )
-        });
         if name == "furnace" {
             furnace_holds(suite, &what, &whole);
         }

@@ -54,7 +54,6 @@ fn without_surfaces_nothing_is_traced() {
         "/counts/rays",
         "/counts/shadow_rays",
         "/counts/majorant_violations",
-        "/counts/rejected_samples",
     ] {
         assert_eq!(number(&s, figure), 0.0, "{figure}");
     }

@@ -113,7 +113,7 @@ fn integrators() {
         "integrator",
         &[
             ("OWN_RANDOM", "determinism"),
-            ("NOT_FINITE", "samples"),
+            ("NOT_FINITE", "failures"),
             ("BRIGHT", "energy"),
             ("BRIGHTENS", "energy"),
             ("REPEATS", "samples"),

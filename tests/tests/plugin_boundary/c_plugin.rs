@@ -51,7 +51,7 @@ fn a_phase_function_in_c_renders_as_the_one_in_rust() {
     let of = |a: f64| with_phase(json!({ "plugin": library, "params": { "a": a } }), 1);
     let reference = with_phase(json!("isotropic"), 1);
     let same = of(0.0);
-    assert!(same.counters.collisions > 10_000 && same.counters.rejected == 0);
+    assert!(same.counters.collisions > 10_000);
     assert_ne!(same.pixels, reference.pixels, "the paths should differ");
     let (p, level) = farthest(&same, &reference);
     assert!(p > level, "p = {p:.1e}, level {level:.1e}");

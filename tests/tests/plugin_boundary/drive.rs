@@ -33,8 +33,6 @@ pub struct Picture {
     pub counters: Counters,
     /// Samples that every pixel has.
     pub samples: u32,
-    /// Where the first sample that is not finite was.
-    pub rejected_at: Option<[u32; 2]>,
 }
 
 impl Picture {
@@ -47,7 +45,6 @@ impl Picture {
             variances,
             counters: r.counters,
             samples: r.samples,
-            rejected_at: r.rejected_at,
         }
     }
 

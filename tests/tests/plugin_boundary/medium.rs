@@ -13,7 +13,7 @@ use std::sync::Mutex;
 fn without_a_mode_it_renders() {
     let p = picture(&cloud("none"), &registry(), 32).unwrap_or_else(|f| panic!("{}", f.text));
     assert!(p.counters.collisions > 10_000 && p.counters.nulls > 1000);
-    assert_eq!((p.counters.rejected, p.counters.violations), (0, 0));
+    assert_eq!(p.counters.violations, 0);
     assert!(p.pixels.iter().flatten().all(|v| *v > 0.0 && v.is_finite()));
 }
 

@@ -1,7 +1,7 @@
 //! The same through the program: exit codes, and one sentence on the terminal.
 
 use crate::build;
-use crate::drive::{cloud, haze, picture, registry, walk};
+use crate::drive::{cloud, haze, walk};
 use resolvent_image::Image;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -146,19 +146,15 @@ fn what_was_finished_is_saved() {
     assert!(image.is_ok(), "{:?}", image.err());
 }
 
-/// Samples that are not finite are a warning that names the plugin; the picture is written.
+/// A sample that is not finite ends the render with an error that names the plugin, the pixel and what was saved.
 #[test]
-fn samples_that_are_not_finite_are_a_warning() {
-    let r = run("rejected", &walk("radiance is NaN"));
-    assert_eq!(r.code, Some(0), "{}", r.stderr);
+fn samples_that_are_not_finite() {
+    let r = run("not-finite", &walk("radiance is NaN"));
+    assert_eq!(r.code, Some(2), "{}", r.stderr);
     assert_eq!(r.stderr.lines().count(), 1, "{}", r.stderr);
-    let rejected = 16 * picture(&walk("none"), &registry(), 32).map_or(0, |p| p.pixels.len());
-    let words = [
-        format!("warning: {rejected} samples"),
-        build::unruly("integrator").display().to_string(),
-    ];
+    let path = build::unruly("integrator").display().to_string();
+    let words = [path.as_str(), "gave sample 1 of pixel (", "NaN"];
     assert!(words.iter().all(|w| r.stderr.contains(w)), "{}", r.stderr);
-    assert!(r.picture.is_file());
 }
 
 /// A majorant that is too small is a warning.

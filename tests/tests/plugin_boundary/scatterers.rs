@@ -8,7 +8,6 @@ use serde_json::json;
 fn without_a_mode_they_render() {
     for scene in [haze("none"), wall("none")] {
         let p = picture(&scene, &registry(), 32).unwrap_or_else(|f| panic!("{}", f.text));
-        assert_eq!(p.counters.rejected, 0);
         assert!(p.pixels.iter().flatten().all(|v| *v > 0.0 && v.is_finite()));
     }
 }

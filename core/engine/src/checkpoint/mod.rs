@@ -23,8 +23,6 @@ pub struct State {
     pub film: Film,
     /// Counts over all workers.
     pub counters: Counters,
-    /// Where the first sample that was not finite came up.
-    pub rejected_at: Option<[u32; 2]>,
     /// Seconds of rendering.
     pub seconds: f64,
     /// How far an adaptive render has come.
@@ -47,7 +45,6 @@ impl State {
         Self {
             film,
             counters: Counters::default(),
-            rejected_at: None,
             seconds: 0.0,
             adaptive: None,
         }
@@ -55,7 +52,7 @@ impl State {
 
     /// The file that [`Checkpoint::read`] reads.
     pub fn to_bytes(&self, identity: &Value, about: &Value) -> Vec<u8> {
-        let rest = (self.counters, self.rejected_at, self.seconds);
+        let rest = (self.counters, self.seconds);
         write(identity, about, &self.film, rest, self.adaptive.as_ref())
     }
 
@@ -84,8 +81,6 @@ impl State {
         Ok(Self {
             film,
             counters: counters.ok_or("is damaged: it has no counters")?,
-            rejected_at: numbers("rejected_at")
-                .and_then(|n| Some([*n.first()? as u32, *n.get(1)? as u32])),
             seconds: header["seconds"].as_f64().unwrap_or(0.0).max(0.0),
             adaptive,
         })
@@ -96,7 +91,7 @@ fn write(
     identity: &Value,
     about: &Value,
     film: &Film,
-    (counters, rejected_at, seconds): (Counters, Option<[u32; 2]>, f64),
+    (counters, seconds): (Counters, f64),
     adaptive: Option<&Adaptive>,
 ) -> Vec<u8> {
     let header = json!({
@@ -106,7 +101,6 @@ fn write(
         "features": film.has_features(),
         "halves": film.halves().count(),
         "counters": counters.to_array(),
-        "rejected_at": rejected_at,
         "seconds": seconds,
     });
     let mut out = Writer::new(header.to_string().as_bytes());
@@ -122,7 +116,7 @@ fn write(
 impl Rendered {
     /// The checkpoint of what was rendered, see [`State::to_bytes`].
     pub fn to_bytes(&self, identity: &Value, about: &Value) -> Vec<u8> {
-        let rest = (self.counters, self.rejected_at, self.seconds);
+        let rest = (self.counters, self.seconds);
         write(identity, about, &self.film, rest, self.adaptive.as_ref())
     }
 }
@@ -167,8 +161,6 @@ impl Checkpoint {
         self.state.film.join(&other.state.film)?;
         self.state.counters.add(&other.state.counters);
         self.state.seconds += other.state.seconds;
-        let first = [self.state.rejected_at, other.state.rejected_at];
-        self.state.rejected_at = first.into_iter().flatten().min();
         Ok(())
     }
 }

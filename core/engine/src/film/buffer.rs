@@ -46,10 +46,6 @@ pub struct Buffer {
     pub(super) orders: Option<Layers>,
     /// Light from walks that started at lights.
     pub splats: Splats,
-    /// Samples that were left out.
-    pub rejected: u64,
-    /// Where the first of them was.
-    pub rejected_at: Option<[u32; 2]>,
 }
 
 impl Buffer {
@@ -69,8 +65,6 @@ impl Buffer {
             },
             orders: None,
             splats: Splats::default(),
-            rejected: 0,
-            rejected_at: None,
         }
     }
 
@@ -94,19 +88,18 @@ impl Buffer {
         layers: &[Spectrum],
         exposure: f32,
     ) -> Result<(), String> {
-        let rejected = self.rejected;
         self.add(x, y, s)?;
         let i = ((y - self.min[1]) * self.width + (x - self.min[0])) as usize;
         match &mut self.orders {
-            // What the picture left out, its layers leave out.
-            Some(orders) if self.rejected == rejected => {
-                orders.add(i, s.radiance, layers, exposure)
-            }
-            _ => Ok(()),
+            Some(orders) => orders.add(i, s.radiance, layers, exposure),
+            None => Ok(()),
         }
     }
 
-    /// Adds the next sample of pixel (x, y). A sample that is not finite counts as taken and black, and is reported.
+    /// Adds the next sample of pixel (x, y).
+    ///
+    /// # Errors
+    /// If the pixel is elsewhere, or the sample is not finite or more than a film can hold; in words that follow the integrator's name.
     #[inline]
     pub fn add(&mut self, x: u32, y: u32, s: &PixelSample) -> Result<(), String> {
         let (column, row) = (x.wrapping_sub(self.min[0]), y.wrapping_sub(self.min[1]));
@@ -117,16 +110,19 @@ impl Buffer {
             ));
         }
         let good = s.radiance.0[..3].iter().all(|v| fits(*v)) && fits(s.alpha);
-        let radiance = if good { s.radiance } else { Spectrum::ZERO };
         if !good {
-            self.rejected += 1;
-            self.rejected_at.get_or_insert([x, y]);
+            let [r, g, b, _] = s.radiance.0;
+            return Err(format!(
+                "gave sample {} of pixel ({x}, {y}) the radiance {r:e} {g:e} {b:e} and the alpha {:e}, which is not finite or more than a film can hold",
+                self.samples.start + self.pixels[index].taken,
+                s.alpha
+            ));
         }
         let p = &mut self.pixels[index];
         for lane in 0..3 {
-            p.radiance[lane] += fix(radiance[lane]);
+            p.radiance[lane] += fix(s.radiance[lane]);
         }
-        p.alpha += fix(if good { s.alpha } else { 0.0 });
+        p.alpha += fix(s.alpha);
         p.taken += 1;
         if let Some(f) = self.features.get_mut(index)
             && s.depth > 0.0

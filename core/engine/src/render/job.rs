@@ -147,10 +147,6 @@ impl<'j> Job<'j> {
         let mut state = self.state();
         let state = &mut *state;
         state.counters.add(&piece.counters);
-        if let Some(at) = piece.buffer.rejected_at {
-            let first = state.rejected_at.map_or(at, |old| old.min(at));
-            state.rejected_at = Some(first);
-        }
         match into {
             Into::Film { second } => state.film.half(second).merge(piece.buffer, filter),
             Into::Probe { second } => match &mut state.adaptive {

@@ -77,8 +77,6 @@ pub struct Rendered {
     pub samples: u32,
     /// Seconds, with those of earlier parts that it went on from.
     pub seconds: f64,
-    /// Where the first sample that was not finite came up.
-    pub rejected_at: Option<[u32; 2]>,
     /// How far it came, if it was adaptive.
     pub adaptive: Option<Adaptive>,
 }
@@ -92,7 +90,6 @@ impl From<State> for Rendered {
             film: s.film,
             counters: s.counters,
             seconds: s.seconds,
-            rejected_at: s.rejected_at,
             adaptive: s.adaptive,
         }
     }

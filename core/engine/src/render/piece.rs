@@ -57,11 +57,9 @@ pub fn render(
             "{title} added {n} samples to pixel ({x}, {y}) instead of {wanted}"
         ));
     }
-    let mut counters = view.counters();
-    counters.rejected = sink.buffer.rejected;
     Ok(Finished {
         buffer: sink.buffer,
-        counters,
+        counters: view.counters(),
     })
 }
 
@@ -95,9 +93,10 @@ impl Sink {
             .splats
             .add_order(film, radiance * self.exposure, order)
         {
-            self.buffer.rejected += 1;
-            let at = film.map(|v| v.max(0.0) as u32);
-            self.buffer.rejected_at.get_or_insert(at);
+            let ([x, y], [r, g, b, _]) = (film, radiance.0);
+            return self.fail(format!(
+                "added the radiance {r:e} {g:e} {b:e} at ({x}, {y}) of the film, which is not finite or more than a film can hold"
+            ));
         }
         Status::OK
     }

@@ -34,13 +34,11 @@ pub struct Counters {
     pub lookups: u64,
     /// Points where extinction exceeded its majorant.
     pub violations: u64,
-    /// Samples that were not finite and left out.
-    pub rejected: u64,
 }
 
 impl Counters {
     /// All counts, in the order of the fields.
-    pub(crate) fn to_array(self) -> [u64; 10] {
+    pub(crate) fn to_array(self) -> [u64; 9] {
         [
             self.rays,
             self.shadow_rays,
@@ -51,7 +49,6 @@ impl Counters {
             self.nulls,
             self.lookups,
             self.violations,
-            self.rejected,
         ]
     }
 
@@ -71,8 +68,7 @@ impl Counters {
             nulls,
             lookups,
             violations,
-            rejected,
-        ] = *<&[u64; 10]>::try_from(all).ok()?;
+        ] = *<&[u64; 9]>::try_from(all).ok()?;
         Some(Self {
             rays,
             shadow_rays,
@@ -83,7 +79,6 @@ impl Counters {
             nulls,
             lookups,
             violations,
-            rejected,
         })
     }
 
@@ -98,7 +93,6 @@ impl Counters {
         self.nulls += o.nulls;
         self.lookups += o.lookups;
         self.violations += o.violations;
-        self.rejected += o.rejected;
     }
 }
 
