@@ -230,7 +230,8 @@ impl Kernel<'_> {
         };
         let wi = Vec3::from(s.wi);
         let e = scatter::eval(scene, here, wi, Mode::Radiance)?;
-        if !(e.forward > 0.0) {
+        // Where the walk's own density is below all normal numbers, one over it is infinite; such a branch weighs nothing (S > 10³⁰).
+        if !(e.forward >= f32::MIN_POSITIVE) {
             return Ok(Spectrum::ZERO);
         }
         let mut walk = *walk;
