@@ -26,6 +26,12 @@ pub fn full() -> bool {
     std::env::var_os("RESOLVENT_FULL").is_some_and(|v| v == "1")
 }
 
+/// Whether a row is to be measured: those whose names contain `RESOLVENT_ONLY`, else all. Hours of rows can so be measured in
+/// parts.
+pub fn chosen(row: &str) -> bool {
+    std::env::var("RESOLVENT_ONLY").map_or(true, |part| row.contains(&part))
+}
+
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Measured {

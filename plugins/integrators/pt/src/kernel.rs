@@ -26,6 +26,8 @@ pub struct Kernel<'a> {
     pub scene: &'a SceneView<'a>,
     /// Scattering events after which a path ends.
     pub max_depth: u32,
+    /// Vertices are connected to lights.
+    pub connects: bool,
     /// Direction towards the sun, if walks branch.
     pub sun: Option<Vec3>,
     /// Probability c of a branch.
@@ -113,7 +115,6 @@ impl Kernel<'_> {
     ) -> Outcome<Spectrum> {
         let scene = self.scene;
         let lanes = scene.lanes();
-        let connects = scene.has(scene_traits::LIGHTS);
         let emissive = scene.has(scene_traits::EMISSIVE_MEDIA);
         let mut light = Spectrum::ZERO;
         loop {
@@ -130,7 +131,7 @@ impl Kernel<'_> {
             let medium = next.is(VertexKind::Medium);
             if !medium && next.flags & vertex_flags::EMITS != 0 {
                 let other = match walk.found {
-                    Found::With(density) if connects => scene.light_density(here, next) / density,
+                    Found::With(density) if self.connects => scene.light_density(here, next) / density,
                     _ => 0.0,
                 };
                 let found = walk.beta.found::<CHROMATIC>(edge, other, lanes);
@@ -155,7 +156,7 @@ impl Kernel<'_> {
             }
             let bounce = sampler.bounce(walk.depth, walk.shared);
             walk.shared = bounce.next;
-            if connects {
+            if self.connects {
                 let connected = self.connect::<CHROMATIC>(here, &walk, sampler, &bounce)? * share;
                 light += connected;
                 tally.add(order + 1, connected);

@@ -7,6 +7,7 @@
 //! | parameter | type | default | meaning |
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events after which a path ends, −1: none. A limit makes the picture darker than it should be |
+//! | `sample_lights` | bool | true | connect vertices to lights. Without, light is only met by scattering: cheaper where lights fill much of the view, as the sky does round a thick cloud, and blind to point and sun lights |
 //! | `branching` | float 0…1 | 0.25 | probability of a branch towards the sun at a vertex in a medium; the picture's mean does not depend on it |
 //!
 //! ```json
@@ -26,6 +27,7 @@ use resolvent_pathspace::samples;
 /// The integrator.
 struct PathTracer {
     max_depth: u32,
+    sample_lights: bool,
     branching: f32,
 }
 
@@ -40,6 +42,12 @@ impl Plugin for PathTracer {
         .default("-1")
         .at_least(-1.0)
         .build(),
+        Decl::bool(
+            "sample_lights",
+            "connect vertices to lights; false: light is only met by scattering, point lights and suns without a disk never",
+        )
+        .default("true")
+        .build(),
         Decl::float(
             "branching",
             "probability of a branch towards the sun at a vertex in a medium; 0: never",
@@ -53,6 +61,7 @@ impl Plugin for PathTracer {
     fn create(params: &Params<'_>) -> Result<Self, Error> {
         Ok(Self {
             max_depth: u32::try_from(params.int("max_depth")?).unwrap_or(u32::MAX),
+            sample_lights: params.bool("sample_lights")?,
             branching: params.float("branching")? as f32,
         })
     }
@@ -66,6 +75,7 @@ impl Integrator for PathTracer {
         let kernel = Kernel {
             scene,
             max_depth: self.max_depth,
+            connects: self.sample_lights && scene.has(scene_traits::LIGHTS),
             sun,
             branching: self.branching,
         };
