@@ -109,7 +109,8 @@ pub struct Render {
     #[arg(long, value_name = "X0,Y0,X1,Y1", help_heading = "Picture")]
     pub crop: Option<Window>,
     /// Further layers of EXR files: depth, albedo, normal (of the first collision or surface), variance (of each pixel's mean),
-    /// samples, or orders:N (light scattered 0, 1, ... N times, and the rest: layers that sum to the picture)
+    /// error_95 (half the width of each pixel's 95 % interval), samples, or orders:N (light scattered 0, 1, ... N times, and the
+    /// rest: layers that sum to the picture)
     #[arg(
         long,
         value_name = "LAYER",
@@ -414,7 +415,7 @@ pub struct Info {
 /// Options of `compare`.
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Examples:\n  resolvent compare out.exr reference.exr\n  resolvent compare out.exr reference.exr --fail && echo same picture\n\nThe z-test needs a layer `variance` in at least one of the images (render with --aov variance)."
+    after_help = "Examples:\n  resolvent compare out.exr reference.exr\n  resolvent compare out.exr reference.exr --fail && echo same picture\n\nThe z-test needs a layer `variance` in at least one of the images (render with --aov variance). With a layer `error_95`, the share of values is told that differ by no more than the intervals allow: 95 % if only noise differs."
 )]
 pub struct Compare {
     /// The image

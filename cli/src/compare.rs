@@ -45,6 +45,7 @@ fn report(c: &Comparison) -> Value {
         "mean": c.mean,
         "reference_mean": c.reference_mean,
         "mean_ratio": c.mean_ratio,
+        "within_error_95": c.within_error_95,
         "z_test": c.regions.as_ref().map(|r| json!({
             "passed": r.passed(),
             "regions": r.grid,
@@ -74,6 +75,9 @@ fn print(c: &Comparison) {
     println!("mean            {}", three(c.mean));
     println!("reference mean  {}", three(c.reference_mean));
     println!("mean ratio      {}", three(c.mean_ratio));
+    if let Some(share) = c.within_error_95 {
+        println!("within error_95 {:.2} % of the values", 100.0 * share);
+    }
     let Some(r) = &c.regions else {
         println!("z-test          none: neither image has a layer `variance`");
         return;

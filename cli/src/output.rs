@@ -206,6 +206,15 @@ pub fn image(scene: &Scene, rendered: &Rendered) -> (Image, Vec<Aov>) {
                 let lane = |k: usize| of(&|e| e.variance.map_or(f64::NAN, |v| v[k]));
                 image.push(name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
             }
+            Aov::Error95 => {
+                let half_widths = film.half_widths();
+                if half_widths.iter().all(|h| h[0].is_nan()) {
+                    missing.push(aov);
+                    continue;
+                }
+                let lane = |k: usize| half_widths.iter().map(|h| h[k] as f32).collect();
+                image.push(name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
+            }
         }
     }
     (image, missing)

@@ -35,6 +35,10 @@ pub struct Comparison {
     pub reference_mean: [f64; 3],
     /// `mean / reference_mean`; not finite where the reference is black.
     pub mean_ratio: [f64; 3],
+    /// Share of the values, a pixel's channels one by one, that differ by no more than the intervals of the layer `error_95` allow
+    /// (of both images, if both have one: √(a² + b²)): 95 % if only noise differs. Values that have no noise in
+    /// either do not count; `None` if there are no others, or no intervals.
+    pub within_error_95: Option<f64>,
     /// The z-tests, if at least one image has a layer `variance`.
     pub regions: Option<Regions>,
 }
@@ -98,6 +102,8 @@ struct Side<'a> {
     color: [&'a [f32]; 3],
     /// Variance of each pixel's mean.
     variance: Option<[&'a [f32]; 3]>,
+    /// Half the width of each pixel's 95 % interval.
+    error_95: Option<[&'a [f32]; 3]>,
 }
 
 impl<'a> Side<'a> {
@@ -105,14 +111,20 @@ impl<'a> Side<'a> {
         let color = image.color();
         let color =
             color.ok_or_else(|| Incomparable(format!("the {which} has no channels R, G, B")))?;
-        let variance = image.layer("variance").and_then(Layer::rgb_or_grey);
+        let layer = |name: &str| image.layer(name).and_then(Layer::rgb_or_grey);
+        let (variance, error_95) = (layer("variance"), layer("error_95"));
         let complete = |c: &[&[f32]; 3]| c.iter().all(|c| c.len() == image.pixels());
-        if !complete(&color) || variance.is_some_and(|v| !complete(&v)) {
+        let noise = [variance, error_95];
+        if !complete(&color) || noise.iter().flatten().any(|v| !complete(v)) {
             return Err(Incomparable(format!(
                 "a channel of the {which} does not cover its pixels"
             )));
         }
-        Ok(Side { color, variance })
+        Ok(Side {
+            color,
+            variance,
+            error_95,
+        })
     }
 
     fn at(&self, pixel: usize) -> [f64; 3] {
@@ -121,7 +133,8 @@ impl<'a> Side<'a> {
 
     fn is_finite(&self, pixel: usize) -> bool {
         let fine = |c: &[&[f32]; 3]| c.iter().all(|c| c[pixel].is_finite());
-        fine(&self.color) && self.variance.as_ref().is_none_or(fine)
+        let noise = [self.variance, self.error_95];
+        fine(&self.color) && noise.iter().flatten().all(fine)
     }
 }
 
@@ -178,8 +191,28 @@ pub fn compare(
         mean,
         reference_mean,
         mean_ratio: std::array::from_fn(|c| mean[c] / reference_mean[c]),
+        within_error_95: within_error_95(&x, &r, &finite),
         regions: noisy.then(|| regions(&x, &r, &finite, [image.width, image.height], grid)),
     })
+}
+
+fn within_error_95(x: &Side<'_>, r: &Side<'_>, finite: &[bool]) -> Option<f64> {
+    if x.error_95.is_none() && r.error_95.is_none() {
+        return None;
+    }
+    let (mut within, mut all) = (0.0, 0.0);
+    for i in (0..finite.len()).filter(|i| finite[*i]) {
+        let (a, b) = (x.at(i), r.at(i));
+        for c in 0..3 {
+            let of = |s: &Side<'_>| s.error_95.map_or(0.0, |e| f64::from(e[c][i]));
+            let width = of(x).hypot(of(r));
+            if width > ROUNDING * a[c].abs().max(b[c].abs()) {
+                all += 1.0;
+                within += f64::from(u8::from((a[c] - b[c]).abs() <= width));
+            }
+        }
+    }
+    (all > 0.0).then(|| within / all)
 }
 
 fn regions(

@@ -75,6 +75,43 @@ fn figures_worked_out_by_hand() {
     assert!(c.regions.is_none());
 }
 
+/// Two noisy images within the intervals of both, and one within its own of what has none.
+#[test]
+fn intervals_are_counted() {
+    let mut random = Random(5);
+    let with_intervals = |random: &mut Random, stated: f32| {
+        let mut image = noisy(random, 0.3, |_, _| 1.0);
+        assert!(test(&image, &image).within_error_95.is_none());
+        let variance = image.layer("variance").unwrap().rgb_or_grey().unwrap();
+        let error = variance.map(|v| v.iter().map(|v| stated * 1.96 * v.sqrt()).collect());
+        image.push("error_95", ["R", "G", "B"].into_iter().zip(error));
+        image
+    };
+    let mut truth = noisy(&mut random, 0.0, |_, _| 1.0);
+    let (a, b) = (
+        with_intervals(&mut random, 1.0),
+        with_intervals(&mut random, 1.0),
+    );
+    let narrow = with_intervals(&mut random, 0.5);
+    let share = |a: &Image, b: &Image| test(a, b).within_error_95.unwrap();
+    // Of 12,288 values 0.2 % is the standard error. Half of the width covers 67.3 %.
+    for (x, y, expected) in [(&a, &b, 0.95), (&a, &truth, 0.95), (&truth, &narrow, 0.673)] {
+        let share = share(x, y);
+        assert!((share - expected).abs() < 0.012, "{share} {expected}");
+    }
+    // What has no noise does not count.
+    truth.layers[0].channels[1].data[..500].fill(0.7);
+    let mut quiet = a.clone();
+    let before = share(&quiet, &truth);
+    quiet.layers[2].channels[1].data[..500].fill(0.0);
+    assert!(share(&quiet, &truth) > before + 0.03);
+    quiet.layers[2]
+        .channels
+        .iter_mut()
+        .for_each(|c| c.data.fill(0.0));
+    assert!(test(&quiet, &truth).within_error_95.is_none());
+}
+
 #[test]
 fn the_worst_thousandth_is_left_out() {
     let r = constant([1.0; 3], 2001);

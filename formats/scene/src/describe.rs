@@ -247,6 +247,8 @@ pub enum Aov {
     Normal,
     /// Variance of the pixel's mean.
     Variance,
+    /// Half the width of the pixel's 95 % interval.
+    Error95,
     /// Samples taken.
     Samples,
     /// Light by scattering order, as layers `order0` … `orderN` and `order_rest`, which sum to the picture: the N + 1 first terms
@@ -256,11 +258,12 @@ pub enum Aov {
 
 impl Aov {
     /// All that a name is enough for.
-    pub const NAMED: [Aov; 5] = [
+    pub const NAMED: [Aov; 6] = [
         Aov::Depth,
         Aov::Albedo,
         Aov::Normal,
         Aov::Variance,
+        Aov::Error95,
         Aov::Samples,
     ];
 
@@ -284,6 +287,7 @@ impl Aov {
             Aov::Albedo => "albedo",
             Aov::Normal => "normal",
             Aov::Variance => "variance",
+            Aov::Error95 => "error_95",
             Aov::Samples => "samples",
             Aov::Orders(_) => "orders",
         }

@@ -109,12 +109,12 @@ fn keys_and_names() {
     expect(
         "\"samples\", \"orders:4\"",
         "\"samples\", \"orders:4.5\"",
-        r#"full.json:12:66: $.film.aovs[5]: "orders:4.5" is no layer; orders are asked for as "orders:N", N from 0 to 99"#,
+        r#"full.json:12:78: $.film.aovs[6]: "orders:4.5" is no layer; orders are asked for as "orders:N", N from 0 to 99"#,
     );
     expect(
         "\"samples\", \"orders:4\"",
         "\"orders:3\", \"orders:4\"",
-        r#"full.json:12:67: $.film.aovs[5]: "orders:4" is named twice"#,
+        r#"full.json:12:79: $.film.aovs[6]: "orders:4" is named twice"#,
     );
     expect(
         "\"interior\": \"fog\"},\n    {\"type\": \"rectangle\"",

@@ -42,8 +42,8 @@ fn every_key_arrives() {
             sigma: 0.6
         }
     );
-    assert_eq!(s.film.aovs[..5], Aov::NAMED);
-    assert_eq!(s.film.aovs[5..], [Aov::Orders(4)]);
+    assert_eq!(s.film.aovs[..6], Aov::NAMED);
+    assert_eq!(s.film.aovs[6..], [Aov::Orders(4)]);
     assert_eq!(s.film.order_layers(), 6);
     assert_eq!(
         s.sampling,

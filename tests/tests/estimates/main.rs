@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 use resolvent_api::{Affine, PluginKind};
-use resolvent_engine::film::{Errors, student};
+use resolvent_engine::film::Errors;
 use resolvent_engine::plugin::{ForeignIntegrator, Registry};
 use resolvent_engine::scene::Scene;
 use resolvent_engine::{Goal, Rendered, Settings, render};
@@ -69,7 +69,7 @@ impl Shot {
 /// What many renders say of themselves, against their mean.
 #[derive(Debug)]
 struct Calibration {
-    /// Share of pixels and lanes whose 95 % interval covers the truth.
+    /// Share of pixels and lanes whose 95 % interval covers the truth, of those that have any noise.
     pixels: f64,
     /// Share of pictures whose interval of the mean covers the truth, over lanes.
     means: f64,
@@ -84,7 +84,7 @@ struct Calibration {
 fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     let all: Vec<Rendered> = (0..seeds)
         .into_par_iter()
-        .map(|seed| shot.render(seed + 1, samples, Goal::Samples))
+        .map(|seed| shot.render(seed + 5001, samples, Goal::Samples))
         .collect();
     let n = seeds as f64;
     // The truth is the mean of all others, whose own error widens the difference a little.
@@ -104,17 +104,21 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     // The picture is one tile, or even enough to be taken for one.
     let mean_of = |k: usize| pixel_means.iter().map(|m| m[k]).sum::<f64>();
     let level_of_tile = [0, 1, 2].map(|k| mean_of(k) / shot.pixels() as f64);
-    let (mut sum_of_variance, mut sum_of_squares) = (0.0, 0.0);
+    let (mut sum_of_variance, mut sum_of_squares, mut noisy) = (0.0, 0.0, 0.0);
+    let half_widths: Vec<_> = all.iter().map(|r| r.film.half_widths()).collect();
     for (i, truth) in pixel_means.iter().enumerate() {
-        for r in &all {
+        // Of a constant sky there is nothing to cover.
+        let first = all[0].film.estimate(i).mean[0];
+        let is_noisy = |r: &Rendered| (r.film.estimate(i).mean[0] / first - 1.0).abs() > 1e-9;
+        let counts = f64::from(u8::from(all.iter().any(is_noisy)));
+        for (r, half_widths) in all.iter().zip(&half_widths) {
             let e = r.film.estimate(i);
             let variance = e.variance.unwrap_or_else(|| panic!("no variance"));
             for k in 0..3 {
                 let off = (e.mean[k] - truth[k]) * n / (n - 1.0);
-                let half = student(e.degrees[k]) * variance[k].sqrt();
-                // Pixels without noise, of a constant sky, differ by rounding alone.
-                let rounding = 1e-12 * truth[k].abs();
-                covered += f64::from(u8::from(off.abs() <= half * widening.sqrt() + rounding));
+                let inside = off.abs() <= half_widths[i][k] * widening.sqrt();
+                covered += counts * f64::from(u8::from(inside));
+                noisy += counts;
                 tested += 1.0;
                 let mean = level_of_tile[k];
                 true_error += off * off / widening / (mean * mean + 0.01 * level * level);
@@ -141,7 +145,7 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     }
     let doubtful = |r: &&Rendered| r.film.errors().is_some_and(|e| e.are_doubtful());
     Calibration {
-        pixels: covered / tested,
+        pixels: covered / noisy,
         means,
         error: true_error / tested / stated_error,
         variance: sum_of_squares / sum_of_variance,
@@ -149,45 +153,51 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
     }
 }
 
-/// What 200 renders say of their errors is true on average, with light tails and heavy ones, and 95 % intervals cover the truth: pixel by
-/// pixel 93 to 97 % of the time where values are smooth. In fog and in a cloud the values of a net are skewed, and 88 to 89 %
-/// are covered: such pictures doubt their error. The picture's mean is covered as it should, but for the cloud (91 %), whose sun has
-/// the heaviest tails.
-#[test]
-fn intervals_cover_the_truth() {
-    // Net by net: 64 samples are four of 16; smooth surfaces, fog, a cloud in the sun, walks from both ends, chains.
-    let scenes: [(&str, &str, u32, [f64; 2]); 5] = [
-        ("bench/surface_only.json", "pt", 64, [0.93, 0.97]),
-        ("bench/surface_only.json", "pt", 256, [0.93, 0.97]),
-        ("bench/box_fog.json", "pt", 128, [0.86, 0.97]),
-        ("bench/cloud_sun.json", "pt", 64, [0.86, 0.97]),
-        ("lampshade/lampshade.json", "bdpt", 64, [0.9, 0.97]),
-    ];
-    for (name, integrator, samples, pixels) in scenes {
-        let begin = std::time::Instant::now();
-        let shot = Shot::new(name, integrator, [8, 6]);
-        let samples = samples * if full() { 4 } else { 1 };
-        let c = calibrate(&shot, 200, samples);
-        println!("{name} {integrator} {samples}: {c:?} {:?}", begin.elapsed());
-        // Of 200 pictures 1.5 % is the standard error of a share of 95 %, more with heavy tails.
-        assert!((0.89..=1.0).contains(&c.means), "{name}: {c:?}");
-        assert!((pixels[0]..pixels[1]).contains(&c.pixels), "{name}: {c:?}");
-        // Small nets are the noisier ones: with nets of two sizes the variance is overstated where they help.
-        assert!((0.75..1.15).contains(&c.variance), "{name}: {c:?}");
-        assert!((0.75..1.15).contains(&c.error), "{name}: {c:?}");
-        if pixels[0] < 0.9 {
-            assert!(c.doubtful > 0.9, "{name}: {c:?}");
-        }
-    }
+/// What 200 renders say of their errors is true on average, with light tails and heavy ones, and 95 % intervals of pixels and of
+/// pictures' means cover the truth 93 to 97 % of the time.
+fn covers_the_truth(name: &str, integrator: &str, size: [u32; 2], samples: u32) {
+    let shot = Shot::new(name, integrator, size);
+    let samples = samples * if full() { 4 } else { 1 };
+    let c = calibrate(&shot, 200, samples);
+    println!("{name} {integrator} {samples}: {c:?}");
+    assert!((0.93..0.97).contains(&c.pixels), "{name}: {c:?}");
+    // Of 200 pictures 1.5 % is the standard error of a share of 95 %.
+    assert!((0.915..0.985).contains(&c.means), "{name}: {c:?}");
+    // Small nets are the noisier ones: with nets of two sizes the variance is overstated where they help, up to 1.4 times.
+    assert!((0.7..1.15).contains(&c.variance), "{name}: {c:?}");
+    assert!((0.7..1.15).contains(&c.error), "{name}: {c:?}");
+    assert!(c.doubtful < 0.25, "{name}: {c:?}");
 }
 
-/// Caustics found by chance: fewer pixels are covered (80 %), and the picture says so.
+#[test]
+fn intervals_cover_the_truth_on_surfaces() {
+    // 64 samples are four nets of 16, 256 ten of two sizes.
+    covers_the_truth("bench/surface_only.json", "pt", [12, 8], 64);
+    covers_the_truth("bench/surface_only.json", "pt", [8, 6], 256);
+}
+
+#[test]
+fn intervals_cover_the_truth_in_fog() {
+    covers_the_truth("bench/box_fog.json", "pt", [12, 8], 64);
+}
+
+#[test]
+fn intervals_cover_the_truth_in_a_cloud() {
+    covers_the_truth("bench/cloud_sun.json", "pt", [12, 8], 64);
+}
+
+#[test]
+fn intervals_cover_the_truth_from_both_ends() {
+    covers_the_truth("lampshade/lampshade.json", "bdpt", [8, 6], 64);
+}
+
+/// Caustics found by chance: fewer pixels are covered, and the picture says so.
 #[test]
 fn heavy_tails_are_told() {
     let shot = Shot::new("caustic/caustic.json", "pt", [16, 16]);
     let c = calibrate(&shot, 24, 64);
     println!("{c:?}");
-    assert!(c.doubtful > 0.5, "{c:?}");
+    assert!(c.pixels < 0.93 && c.doubtful > 0.9, "{c:?}");
 }
 
 /// Adaptive renders have the mean of uniform ones, tile by tile.
@@ -219,62 +229,100 @@ fn adaptive_means_are_not_biased() {
     assert!(z.abs() < 3.5, "{z}");
 }
 
-/// Largest relative error of a tile, root mean square over its pixels, by the spread of renders with different seeds.
-fn worst_tile(all: &[Rendered]) -> f64 {
-    let n = all.len() as f64;
-    let film = &all[0].film;
-    let [w, h] = film.size();
-    let count = (w * h) as usize;
-    let estimates: Vec<Vec<f64>> = all
-        .iter()
-        .map(|r| (0..count).map(|i| r.film.estimate(i).mean[0]).collect())
-        .collect();
-    let level = estimates.iter().flatten().sum::<f64>() / n / count as f64;
-    let square = |i: usize| {
-        let m = Moments::of(estimates.iter().map(|e| e[i]));
-        let variance = m.standard_error().powi(2) * n;
-        variance / (m.mean() * m.mean() + 0.01 * level * level)
-    };
-    let window = [0, 0, w, h];
-    film.tiles()
-        .map(|t| t.indices(window).map(square).sum::<f64>() / t.pixels() as f64)
-        .fold(0.0, f64::max)
-        .sqrt()
+/// What some renders of a picture say of its tiles, and what they cost.
+struct Tiles {
+    /// Squares of relative errors, times samples: what does not depend on how many there are. A mean over renders.
+    squares: Vec<f64>,
+    /// Mean over renders of the inverse of the samples.
+    per_sample: Vec<f64>,
+    /// Mean samples of a pixel.
+    samples: f64,
+    /// Mean voxel look-ups: what samples in a cloud cost, on any machine.
+    cost: f64,
 }
 
-/// Samples go where the error is: for the same largest error of a tile, as it is and not as it is stated, `--error` takes fewer
-/// samples than a uniform render.
+impl Tiles {
+    fn of(all: &[Rendered]) -> Self {
+        let n = all.len() as f64;
+        let film = &all[0].film;
+        let [w, h] = film.size();
+        let pixels = (w * h) as usize;
+        let mean_of = |indices: &mut dyn Iterator<Item = usize>| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for i in indices {
+                sum += all.iter().map(|r| r.film.estimate(i).mean[0]).sum::<f64>() / n;
+                count += 1.0;
+            }
+            sum / count
+        };
+        let level = mean_of(&mut (0..pixels));
+        let (mut squares, mut per_sample) = (Vec::new(), Vec::new());
+        for t in film.tiles() {
+            let indices = t.indices([0, 0, w, h]);
+            let mean = mean_of(&mut indices.clone());
+            let (mut square, mut inverse) = (0.0, 0.0);
+            for e in all
+                .iter()
+                .flat_map(|r| indices.clone().map(|i| r.film.estimate(i)))
+            {
+                let variance = e.variance.map_or(f64::NAN, |v| v[0]);
+                square += variance * f64::from(e.samples);
+                inverse += 1.0 / f64::from(e.samples);
+            }
+            let count = n * t.pixels() as f64;
+            squares.push(square / count / (mean * mean + 0.01 * level * level));
+            per_sample.push(inverse / count);
+        }
+        let samples = |r: &Rendered| {
+            let all = (0..pixels).map(|i| f64::from(r.film.estimate(i).samples));
+            all.sum::<f64>() / pixels as f64
+        };
+        Self {
+            squares,
+            per_sample,
+            samples: all.iter().map(samples).sum::<f64>() / n,
+            cost: all.iter().map(|r| r.counters.lookups as f64).sum::<f64>() / n,
+        }
+    }
+}
+
+/// Samples go where the error is: for the same largest error of a tile, `--error` costs less than a uniform render. That stated
+/// errors are true is tested above.
 #[test]
 fn adaptive_sampling_pays() {
-    // The larger the picture, the more tiles are easy.
-    let (size, seeds, goal, least) = if full() {
-        ([128, 96], 4, 0.12, 1.5)
+    // In a small picture nearly all work is in one of its tiles, and no choice of samples could save more than 7 % of the look-ups.
+    let (size, seeds, goal, least_samples, least_cost) = if full() {
+        ([256, 192], 2, 0.15, 2.0, 1.4)
     } else {
-        ([48, 32], 4, 0.12, 1.1)
+        ([48, 32], 4, 0.12, 1.25, 1.0)
     };
     let shot = Shot::new("bench/cloud_sun.json", "pt", size);
-    let many = |first: u64, samples: u32, goal: Goal| -> Vec<Rendered> {
+    let many = |first: u64, samples: u32, goal: Goal| -> Tiles {
         let seeds = (first..first + seeds).into_par_iter();
-        seeds.map(|s| shot.render(s, samples, goal)).collect()
-    };
-    let mean_samples = |all: &[Rendered]| -> f64 {
-        let of = |r: &Rendered| {
-            (0..shot.pixels())
-                .map(|i| f64::from(r.film.estimate(i).samples))
-                .sum::<f64>()
-        };
-        all.iter().map(of).sum::<f64>() / (all.len() * shot.pixels()) as f64
+        let all: Vec<_> = seeds.map(|s| shot.render(s, samples, goal)).collect();
+        Tiles::of(&all)
     };
     let adaptive = many(1, 1 << 20, Goal::Error(goal));
     let uniform = many(100, 64, Goal::Samples);
-    let (a, u) = (worst_tile(&adaptive), worst_tile(&uniform));
+    // Both know how hard each tile is.
+    let hard = adaptive.squares.iter().zip(&uniform.squares);
+    let hard: Vec<f64> = hard.map(|(a, b)| 0.5 * (a + b)).collect();
+    let largest = |per_sample: &[f64]| {
+        let squares = hard.iter().zip(per_sample).map(|(v, p)| v * p);
+        squares.fold(0.0, f64::max).sqrt()
+    };
+    let worst = largest(&adaptive.per_sample);
     // A uniform render's variance falls as the inverse of its samples.
-    let needed = 64.0 * (u / a).powi(2);
-    let gain = needed / mean_samples(&adaptive);
+    let needed = uniform.samples * (largest(&uniform.per_sample) / worst).powi(2);
+    let in_samples = needed / adaptive.samples;
+    let in_cost = needed / uniform.samples * uniform.cost / adaptive.cost;
     println!(
-        "goal {goal}: worst tile {a:.4} with {:.0} spp; uniform needs {needed:.0}: {gain:.2} times",
-        mean_samples(&adaptive)
+        "goal {goal}: worst tile {worst:.4} with {:.0} spp; uniform needs {needed:.0}: {in_samples:.2} times the samples, {in_cost:.2} times the look-ups",
+        adaptive.samples
     );
-    assert!(a < 1.25 * goal, "{a}");
-    assert!(gain > least, "{gain}");
+    assert!(worst < 1.1 * goal, "{worst}");
+    assert!(
+        in_samples > least_samples && in_cost > least_cost,
+        "{in_samples} {in_cost}"
+    );
 }

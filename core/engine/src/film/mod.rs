@@ -8,6 +8,7 @@ mod buffer;
 mod coverage;
 mod error;
 mod fixed;
+mod interval;
 mod orders;
 mod splat;
 mod store;
@@ -15,7 +16,8 @@ mod tile;
 
 pub use buffer::{Buffer, FeatureSums};
 pub use coverage::Coverage;
-pub use error::{Errors, Interval, student};
+pub use error::Errors;
+pub use interval::Interval;
 pub use splat::Splats;
 pub use tile::{Rect, TILE};
 

@@ -32,6 +32,19 @@ impl Rect {
                 .map(move |x| y as usize * width + x as usize)
         })
     }
+
+    /// Those of its pixels that are at most `reach` columns and rows from pixel `i`, counted in rows from the top of the window.
+    pub fn near(&self, window: [u32; 4], i: usize, reach: u32) -> Self {
+        let width = (window[2] - window[0]) as usize;
+        let at = [
+            window[0] + (i % width) as u32,
+            window[1] + (i / width) as u32,
+        ];
+        Self {
+            min: [0, 1].map(|k| self.min[k].max(at[k].saturating_sub(reach))),
+            max: [0, 1].map(|k| self.max[k].min(at[k] + 1 + reach)),
+        }
+    }
 }
 
 /// Tiles across and down.

@@ -31,7 +31,9 @@ pub(super) static FILM: Object = Object {
         may(
             "aovs",
             Kind::Layers(
-                &["depth", "albedo", "normal", "variance", "samples"],
+                &[
+                    "depth", "albedo", "normal", "variance", "error_95", "samples",
+                ],
                 Aov::MOST_ORDERS,
             ),
             "Further layers; \"orders:N\": light scattered 0 to N times, and the rest, in layers that sum to the picture",

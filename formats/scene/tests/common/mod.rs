@@ -15,7 +15,7 @@ pub const FULL: &str = r#"{
   "film": {
     "resolution": [320, 200], "crop": [10, 20, 300, 180],
     "filter": {"type": "gaussian", "radius": 2, "sigma": 0.6},
-    "aovs": ["depth", "albedo", "normal", "variance", "samples", "orders:4"], "pixel_aspect": 1.5
+    "aovs": ["depth", "albedo", "normal", "variance", "error_95", "samples", "orders:4"], "pixel_aspect": 1.5
   },
   "sampling": {"spp": 128, "seed": 18446744073709551615},
   "integrator": {"plugin": "pt", "params": {"max_depth": 12}},
