@@ -135,13 +135,27 @@ pub fn build(scene: &Value) -> Result<Ready, String> {
 /// # Panics
 /// If it cannot be built.
 pub fn open(path: &str, integrator: &str) -> Ready {
+    open_with(path, |s| {
+        s.integrator = resolvent_scene::PluginBlock::new(integrator);
+    })
+}
+
+/// An example scene, by its path there, in [`EDGE`]² pixels.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn open_small(path: &str) -> Ready {
+    open_with(path, |s| s.film.resolution = [EDGE; 2])
+}
+
+fn open_with(path: &str, change: impl FnOnce(&mut resolvent_scene::Scene)) -> Ready {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../scenes")
         .join(path);
     let ready = resolvent_scene::Scene::read(&file)
         .map_err(|e| e.to_string())
         .and_then(|mut described| {
-            described.integrator = resolvent_scene::PluginBlock::new(integrator);
+            change(&mut described);
             build_described(&described)
         });
     ready.unwrap_or_else(|e| panic!("{path}: {e}"))
