@@ -100,7 +100,7 @@ fn intervals_are_counted() {
         assert!((share - expected).abs() < 0.012, "{share} {expected}");
     }
     // What has no noise does not count.
-    truth.layers[0].channels[1].data[..500].fill(0.7);
+    truth.layers[0].channels[1].data[..500].fill(70.0);
     let mut quiet = a.clone();
     let before = share(&quiet, &truth);
     quiet.layers[2].channels[1].data[..500].fill(0.0);
