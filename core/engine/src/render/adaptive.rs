@@ -123,11 +123,11 @@ impl Adaptive {
             }
             for half in 0..2 {
                 let key = (tile, half == 1);
-                if !self.is_probed(tile, half) {
+                if self.is_probed(tile, half) {
+                    let goes_on = || film.half(key.1).cut(tile);
+                    self.probes.entry(key).or_insert_with(goes_on);
+                } else {
                     self.probes.remove(&key);
-                } else if !self.probes.contains_key(&key) {
-                    let probe = film.half(key.1).cut(tile);
-                    self.probes.insert(key, probe);
                 }
             }
         }
