@@ -1,14 +1,12 @@
 //! Samples where the error is: every tile is sampled until its own error is small enough, without a bias.
 //!
 //! A number of samples that depends on their values biases their mean: a pixel that has not met its rare bright light looks
-//! finished (Kirk & Arvo 1991). So the nets of a pixel are dealt to two halves in turn, and *each half's number of samples in the
-//! picture is decided by the other half alone*. Given the second half, the number of samples of the first is fixed, and their mean is
-//! unbiased; the picture is the mean of both means, with equal weights, since weights by number would tie them again.
-//!
-//! A half decides after the first net by which it has [`KNOWN`] of the samples that it takes to meet the goal, by its own estimate, and
-//! the other half then gets as many as that: its last net may be cut, since what most tiles have too many is wasted, as long as one
-//! has just enough. A half that has what the other allows it, but has not decided yet, is sampled further on the side (its
-//! *probe*): for the decision, not for the picture. That is rare.
+//! finished (Kirk & Arvo 1991). So the nets of a pixel are dealt to two halves in turn, and *each half's number of samples is
+//! decided by the other half alone*: the first in the picture is sampled until the second's estimate of the error meets the goal, and
+//! the other way round. Given the second half, the number of samples of the first is fixed, and their mean is unbiased;
+//! the picture is the mean of both means, with equal weights, since weights by number would tie them again. A half that has as many
+//! samples as it may have in the picture, but does not meet the goal yet, is sampled further on the side (its *probe*): for the
+//! decision, not for the picture. The halves agree closely on what a tile needs, so that little is lost by that.
 //!
 //! What a decision takes from beyond its tile, the picture's mean that scales errors, comes from the same half at the end of
 //! the first rounds, which all tiles have.
@@ -31,31 +29,14 @@ const FIRST: u32 = 2;
 /// More rounds than any render has.
 const MOST_ROUNDS: u32 = 1 << 24;
 
-/// Share of the samples it takes that a half must have when it decides: fewer know the variance worse, more are often too many.
-const KNOWN: f64 = 0.5;
-
-/// Samples of a half in its first `rounds` nets. Nets of a round are of one size.
-fn whole(rounds: u32) -> u32 {
-    nets::nth(2 * rounds).start / 2
-}
-
-/// The samples of the picture that are the first `count` of a half, net by net.
-fn samples_of(second: bool, count: u32) -> impl Iterator<Item = Range<u32>> {
-    (0..).map_while(move |round| {
-        let begin = whole(round);
-        let net = nets::nth(2 * round + u32::from(second));
-        (begin < count).then(|| net.start..net.end.min(net.start + (count - begin)))
-    })
-}
-
 /// How far an adaptive render has come, beside its film.
 #[derive(Clone, Debug)]
 pub struct Adaptive {
     goal: f64,
-    /// Rounds that all undecided tiles have done.
+    /// Rounds that all unfinished tiles have done.
     round: u32,
-    /// Tile by tile how many samples each half, by its own, has decided that the other shall have.
-    decided: Vec<[Option<u32>; 2]>,
+    /// Tile by tile whether each half, by its own samples, has met the goal.
+    met: Vec<[bool; 2]>,
     /// What scales the errors of each half, once it is known.
     floors: Option<[f64; 2]>,
     /// Samples of a half beyond those in the picture, with them, by tile and half.
@@ -67,7 +48,7 @@ impl Adaptive {
         Self {
             goal,
             round: 0,
-            decided: vec![[None; 2]; tiles],
+            met: vec![[false; 2]; tiles],
             floors: None,
             probes: BTreeMap::new(),
         }
@@ -85,26 +66,23 @@ impl Adaptive {
             .or_insert_with(|| Film::new([0, 0, 1, 1], false))
     }
 
-    /// True if the tile's half goes on beside the picture: it has not decided, and its next net is more than the other allows it.
-    fn is_probed(&self, tile: usize, half: usize) -> bool {
-        let [own, other] = [half, 1 - half].map(|h| self.decided[tile][h]);
-        own.is_none() && other.is_some_and(|most| most < whole(self.round + 1))
-    }
-
-    /// Lets halves decide after a round. Returns the largest error of a tile that has not.
-    fn decide(&mut self, film: &mut Film) -> f64 {
+    /// Decides after a round which halves have met the goal; true if no tile is left.
+    fn decide(&mut self, film: &mut Film) -> (bool, f64) {
         self.round += 1;
         let mut worst: f64 = 0.0;
         if self.round < FIRST {
-            return f64::INFINITY;
+            return (false, f64::INFINITY);
         }
         let floors = *self
             .floors
             .get_or_insert_with(|| [false, true].map(|second| film.half(second).half_floor()));
-        let own = whole(self.round);
-        for tile in 0..self.decided.len() {
+        for (tile, met) in self.met.iter_mut().enumerate() {
+            if *met == [true; 2] {
+                continue;
+            }
+            let before = *met;
             for (half, floor) in floors.into_iter().enumerate() {
-                if self.decided[tile][half].is_some() {
+                if before[half] {
                     continue;
                 }
                 let second = half == 1;
@@ -114,53 +92,40 @@ impl Adaptive {
                 };
                 // The picture's variance is half of that of either half.
                 let square = 0.5 * error.unwrap_or(f64::INFINITY);
-                let needed = f64::from(own) * square / (self.goal * self.goal);
-                if needed * KNOWN <= f64::from(own) {
-                    self.decided[tile][half] = Some((needed.ceil() as u32).max(own));
-                } else {
-                    worst = worst.max(square);
-                }
+                met[half] = square <= self.goal * self.goal;
+                worst = worst.max(square);
             }
             for half in 0..2 {
-                let key = (tile, half == 1);
-                if self.is_probed(tile, half) {
-                    let goes_on = || film.half(key.1).cut(tile);
-                    self.probes.entry(key).or_insert_with(goes_on);
-                } else {
-                    self.probes.remove(&key);
+                let second = half == 1;
+                if met[half] {
+                    self.probes.remove(&(tile, second));
+                } else if met[1 - half] && !before[1 - half] {
+                    // What the picture has of this half is decided.
+                    let probe = film.half(second).cut(tile);
+                    self.probes.insert((tile, second), probe);
                 }
             }
         }
-        worst.sqrt()
+        (self.met.iter().all(|m| *m == [true; 2]), worst.sqrt())
     }
 
-    /// Number of tiles that have not decided.
-    fn undecided(&self) -> usize {
-        let open = |d: &&[Option<u32>; 2]| d.contains(&None);
-        self.decided.iter().filter(open).count()
-    }
-
-    /// The pieces that are not done yet, of the round and of what has been decided, in at most so many rounds.
-    fn pieces(&self, film: &mut Film, most_rounds: u32) -> Vec<(Rect, usize, Range<u32>, Into)> {
+    /// The pieces of the round that are not done yet.
+    fn pieces(&self, film: &mut Film) -> Vec<(Rect, usize, Range<u32>, Into)> {
         let mut out = Vec::new();
-        let round = whole((self.round + 1).min(most_rounds));
         for (i, rect) in film.tiles().enumerate() {
-            for (half, second) in [false, true].into_iter().enumerate() {
-                let [own, other] = [half, 1 - half].map(|h| self.decided[i][h]);
-                // Halves go on together until both have decided.
-                let most = other.unwrap_or(u32::MAX).min(whole(most_rounds));
-                let count = match (own, other) {
-                    (Some(_), Some(_)) => most,
-                    _ => most.min(round),
+            if self.met[i] == [true; 2] {
+                continue;
+            }
+            for second in [false, true] {
+                let net = nets::nth(2 * self.round + u32::from(second));
+                let (missing, into) = match self.probes.get(&(i, second)) {
+                    Some(probe) => (probe.coverage(0).missing(net), Into::Probe { second }),
+                    None => (
+                        film.half(second).coverage(i).missing(net),
+                        Into::Film { second },
+                    ),
                 };
-                let have = film.half(second).coverage(i);
-                let of_film = samples_of(second, count).flat_map(|r| have.missing(r));
-                out.extend(of_film.map(|r| (rect, i, r, Into::Film { second })));
-                if let Some(probe) = self.probes.get(&(i, second)) {
-                    let have = probe.coverage(0);
-                    let of_probe = samples_of(second, round).flat_map(|r| have.missing(r));
-                    out.extend(of_probe.map(|r| (rect, i, r, Into::Probe { second })));
-                }
+                out.extend(missing.into_iter().map(|r| (rect, i, r, into)));
             }
         }
         out
@@ -174,9 +139,9 @@ impl Adaptive {
             for f in self.floors.unwrap_or_default() {
                 out.extend_from_slice(&f.to_bits().to_le_bytes());
             }
-            // No decision is for 0 samples.
-            for n in self.decided.iter().flatten() {
-                out.extend_from_slice(&n.unwrap_or(0).to_le_bytes());
+            for [a, b] in &self.met {
+                let flags = u32::from(*a) | u32::from(*b) << 1;
+                out.extend_from_slice(&flags.to_le_bytes());
             }
             for (tile, second) in self.probes.keys() {
                 for v in [*tile as u32, u32::from(*second)] {
@@ -199,9 +164,10 @@ impl Adaptive {
             return Err("is damaged: its progress does not agree with itself".into());
         }
         let rects: Vec<Rect> = film.tiles().collect();
-        let mut number = || f.u32().map(|n| (n > 0).then_some(n));
-        let decided = (rects.iter().map(|_| Ok([number()?, number()?])))
-            .collect::<Result<Vec<_>, String>>()?;
+        let met = (rects
+            .iter()
+            .map(|_| f.u32().map(|m| [m & 1 == 1, m & 2 == 2])))
+        .collect::<Result<Vec<_>, _>>()?;
         let mut probes = BTreeMap::new();
         while !f.is_empty() {
             let (tile, second) = (f.u32()? as usize, f.u32()? == 1);
@@ -212,24 +178,21 @@ impl Adaptive {
             let probe = Film::read(&prefix(tile, second), window, false, from)?;
             probes.insert((tile, second), probe);
         }
-        let out = Self {
-            goal,
-            round,
-            decided,
-            floors: has_floors.then_some(floors),
-            probes,
-        };
-        for tile in 0..rects.len() {
+        // A half has a probe if it has not met the goal and the other has.
+        for (tile, met) in met.iter().enumerate() {
             for (half, second) in [false, true].into_iter().enumerate() {
-                let probed = has_floors && out.is_probed(tile, half);
-                let wrong =
-                    out.decided[tile][half].is_some_and(|n| !has_floors || n < whole(FIRST));
-                if wrong || out.probes.contains_key(&(tile, second)) != probed {
-                    return Err(format!("is damaged: tile {tile} has decided in part"));
+                if probes.contains_key(&(tile, second)) != (!met[half] && met[1 - half]) {
+                    return Err(format!("is damaged: tile {tile} has met its goal in part"));
                 }
             }
         }
-        Ok(out)
+        Ok(Self {
+            goal,
+            round,
+            met,
+            floors: has_floors.then_some(floors),
+            probes,
+        })
     }
 }
 
@@ -241,26 +204,22 @@ fn prefix(tile: usize, second: bool) -> String {
 /// Renders until no tile's error is above `goal`; true if it came to that, or to the end of the samples.
 pub fn run(job: &Job, goal: f64) -> bool {
     let mut worst = f64::INFINITY;
-    let most_rounds = nets::number(job.settings.samples.end) / 2;
     loop {
-        let (pieces, tiles, left, is_over) = {
+        let (pieces, tiles, left) = {
             let mut state = job.state();
             let state = &mut *state;
             let Some(a) = &state.adaptive else {
                 return uniform::run(job);
             };
-            let pieces = a.pieces(&mut state.film, most_rounds);
-            let left = a.undecided();
-            (
-                pieces,
-                a.decided.len(),
-                left,
-                left == 0 || a.round >= most_rounds,
-            )
+            if nets::nth(2 * a.round + 1).end > job.settings.samples.end {
+                return true;
+            }
+            let left = a.met.iter().filter(|m| **m != [true; 2]).count();
+            if left == 0 {
+                return true;
+            }
+            (a.pieces(&mut state.film), a.met.len(), left)
         };
-        if is_over && pieces.is_empty() {
-            return true;
-        }
         let finished = AtomicUsize::new(0);
         pieces.par_iter().for_each(|(rect, i, samples, into)| {
             if job.piece(*rect, *i, samples.clone(), *into) {
@@ -282,9 +241,7 @@ pub fn run(job: &Job, goal: f64) -> bool {
         let Some(a) = &mut state.adaptive else {
             continue;
         };
-        if !is_over {
-            worst = a.decide(&mut state.film);
-        }
+        let (end, error) = a.decide(&mut state.film);
         if a.round == FIRST && state.film.has_splats() {
             state.adaptive = None;
             if let Err(why) = state.film.unite() {
@@ -293,8 +250,12 @@ pub fn run(job: &Job, goal: f64) -> bool {
             }
             continue;
         }
+        worst = error;
         let least = state.film.least_samples();
         job.samples.store(least.into(), Ordering::Relaxed);
+        if end {
+            return true;
+        }
     }
 }
 
@@ -346,16 +307,11 @@ mod tests {
     }
 
     /// Renders rounds until no tile is left, through checkpoints if asked.
-    fn adaptive(window: [u32; 4], seed: u64, goal: f64, stops: bool) -> (Film, bool) {
-        let mut probed = false;
+    fn adaptive(window: [u32; 4], seed: u64, goal: f64, stops: bool) -> (Film, Adaptive) {
         let mut film = Film::in_halves(window, false);
         let mut a = Adaptive::new(goal, film.tiles().len());
         loop {
-            let mut pieces = a.pieces(&mut film, 1 << 16);
-            if a.undecided() == 0 && pieces.is_empty() {
-                assert!(a.probes.is_empty());
-                return (film, probed);
-            }
+            let mut pieces = a.pieces(&mut film);
             pieces.reverse();
             for (rect, tile, samples, into) in pieces {
                 let b = buffer(seed, rect, samples);
@@ -373,10 +329,9 @@ mod tests {
                     (film, a) = (read.film, read.adaptive.unwrap());
                 }
             }
-            if a.undecided() > 0 {
-                a.decide(&mut film);
+            if a.decide(&mut film).0 {
+                return (film, a);
             }
-            probed |= !a.probes.is_empty();
         }
     }
 
@@ -420,7 +375,8 @@ mod tests {
     fn tiles_get_what_they_need() {
         let (mut most, mut squares) = (0, 0.0);
         for seed in 0..8 {
-            let (film, _) = adaptive(TALL, seed, 0.3, false);
+            let (film, a) = adaptive(TALL, seed, 0.3, false);
+            assert!(a.met.iter().all(|m| *m == [true; 2]) && a.probes.is_empty());
             let samples = [0, 17].map(|i| film.estimate(i).samples);
             assert_eq!(samples[1], 64);
             most = most.max(samples[0]);
@@ -434,20 +390,5 @@ mod tests {
         }
         assert!(squares.sqrt() < 0.3, "{}", squares.sqrt());
         assert!(most > 500, "{most}");
-    }
-
-    /// Where halves disagree, on a tile of few pixels, the one that wants more goes on beside the picture, through checkpoints as well.
-    #[test]
-    fn halves_that_disagree_are_probed() {
-        let mut all = 0;
-        for seed in 0..60 {
-            let (film, probed) = adaptive(WINDOW, seed, 0.7, false);
-            if probed {
-                all += 1;
-                let (again, _) = adaptive(WINDOW, seed, 0.7, true);
-                assert!((0..18).all(|i| film.estimate(i) == again.estimate(i)));
-            }
-        }
-        assert!(all > 3, "{all}");
     }
 }
