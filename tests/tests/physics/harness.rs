@@ -135,6 +135,18 @@ pub fn build(scene: &Value) -> Result<Ready, String> {
 /// # Panics
 /// If it cannot be built.
 pub fn open(path: &str, integrator: &str) -> Ready {
+    opened(path, integrator, None)
+}
+
+/// As [`open`], in another size.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn open_sized(path: &str, integrator: &str, resolution: [u32; 2]) -> Ready {
+    opened(path, integrator, Some(resolution))
+}
+
+fn opened(path: &str, integrator: &str, resolution: Option<[u32; 2]>) -> Ready {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../scenes")
         .join(path);
@@ -142,6 +154,9 @@ pub fn open(path: &str, integrator: &str) -> Ready {
         .map_err(|e| e.to_string())
         .and_then(|mut described| {
             described.integrator = resolvent_scene::PluginBlock::new(integrator);
+            if let Some(resolution) = resolution {
+                described.film.resolution = resolution;
+            }
             build_described(&described)
         });
     ready.unwrap_or_else(|e| panic!("{path}: {e}"))

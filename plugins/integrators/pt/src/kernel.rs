@@ -131,7 +131,9 @@ impl Kernel<'_> {
             let medium = next.is(VertexKind::Medium);
             if !medium && next.flags & vertex_flags::EMITS != 0 {
                 let other = match walk.found {
-                    Found::With(density) if self.connects => scene.light_density(here, next) / density,
+                    Found::With(density) if self.connects => {
+                        scene.light_density(here, next) / density
+                    }
                     _ => 0.0,
                 };
                 let found = walk.beta.found::<CHROMATIC>(edge, other, lanes);
