@@ -137,7 +137,7 @@ fn metropolis_gains_behind_a_door() {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let mut trials = [Trial::new("bdpt", 32), Trial::new("mlt", 12)];
+    let mut trials = [Trial::new("bdpt", 36), Trial::new("mlt", 14)];
     for seed in 0..SEEDS as u64 {
         for (k, trial) in trials.iter_mut().enumerate() {
             trial.run(&pool, 7000 + 100 * k as u64 + seed);

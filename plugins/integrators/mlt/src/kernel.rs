@@ -166,12 +166,11 @@ impl<'a> Kernel<'a> {
             let found = self.seen::<CHROMATIC, T>(tile, p.pixel, &mut draws, tally)?;
             let [a, b, c, d] = draws.four(End::Sensor, 0, Purpose::Camera);
             let [min, size] = self.window;
-            let camera = [
-                (p.pixel[0] as f32 - min[0] + a) / size[0],
-                (p.pixel[1] as f32 - min[1] + b) / size[1],
-                c,
-                d,
-            ];
+            let across = |k: usize, u: f32| {
+                let place = (p.pixel[k] as f32 - min[k] + u) / size[k];
+                place.min(1.0 - f32::EPSILON)
+            };
+            let camera = [across(0, a), across(1, b), c, d];
             let mut origin = Origin { draws, camera };
             self.sample::<CHROMATIC>(&mut origin)?;
             for Seed { state, weight } in &self.seeds {
@@ -180,8 +179,9 @@ impl<'a> Kernel<'a> {
             }
             for k in 0..self.seeds.len() {
                 let seed = self.seeds[k];
-                while let Some((key, energy)) = starts.next(seed.importance()) {
-                    self.chain.start(key, Some(origin));
+                let (number, energy) = starts.from(seed.importance());
+                for _ in 0..number {
+                    self.chain.start(starts.key(), Some(origin));
                     self.run::<CHROMATIC, T>(seed.state, energy, density, out, tally)?;
                 }
             }

@@ -97,13 +97,13 @@ impl Plugin for Metropolis {
             "mutations",
             "mean number of steps of chains for each sample",
         )
-        .default("16")
+        .default("8")
         .above(0.0)
         .build(),
         Decl::int("length", "steps of a chain")
             .default("128")
             .at_least(1.0)
-            .at_most(1e9)
+            .at_most(1e6)
             .build(),
         Decl::float(
             "connections",
