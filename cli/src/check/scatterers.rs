@@ -9,7 +9,7 @@ use resolvent_api::math::Frame;
 use resolvent_api::phase::MediumPoint;
 use resolvent_api::surface::{SurfacePoint, bsdf_traits as traits};
 use resolvent_api::{Mode, PluginKind, Scatter, Vec3};
-use resolvent_conformance::scatter::{Measured, albedo, directions, edges, examine};
+use resolvent_conformance::scatter::{Measured, Symmetry, albedo_in, directions, edges, examine};
 use resolvent_conformance::{Suite, property};
 use resolvent_engine::plugin::Instance;
 
@@ -33,9 +33,20 @@ pub fn closure<'a>(instance: &Instance, i: usize, failures: &'a Failures) -> Raw
         ng: n.into(),
         frame: Frame::around(n),
         uv: [[0.0; 2], [0.3, 0.7]][i],
+        // As where a normal map has turned the shading normal a little.
+        tangent: Frame::around(Vec3::new(n.x + 0.1, n.y - 0.2, n.z).normalize()),
         ..SurfacePoint::default()
     };
     RawClosure::bsdf(instance, &at, failures)
+}
+
+/// What a BSDF states about itself.
+fn facts(instance: &Instance) -> u32 {
+    if instance.plugin.kind == PluginKind::Bsdf {
+        bsdf_traits(instance)
+    } else {
+        0
+    }
 }
 
 fn measured(instance: &Instance) -> (Measured, f64) {
@@ -65,15 +76,17 @@ pub fn thorough(suite: &mut Suite, subject: &Subject, v: &Variant, stages: Stage
     let (measured, gain) = measured(&instance);
     let failures = Failures::default();
     stages(property::SAMPLING, &v.name);
-    let bits = if measured == Measured::Bsdf {
-        bsdf_traits(&instance)
+    let bits = facts(&instance);
+    let symmetry = if bits & traits::NON_RECIPROCAL != 0 {
+        Symmetry::None
+    } else if bits & traits::OWN_NORMALS != 0 {
+        Symmetry::Adjoint
     } else {
-        0
+        Symmetry::Reciprocal
     };
-    let reciprocal = bits & traits::NON_RECIPROCAL == 0;
     let k = closure(&instance, 0, &failures);
     for wo in ways(measured) {
-        examine(suite, &v.name, &k, measured, wo, gain, reciprocal);
+        examine(suite, &v.name, &k, measured, wo, gain, symmetry);
     }
     stages(property::EDGES, &v.name);
     edges(suite, &v.name, &k, measured);
@@ -105,9 +118,17 @@ pub fn brief(suite: &mut Suite, name: &str, instance: &Instance) {
     let k = closure(instance, 1, &failures);
     edges(suite, name, &k, measured);
     suite.about(property::ENERGY);
+    // Lobes with normals of their own keep within it in radiance mode only.
+    let mode = if facts(instance) & traits::OWN_NORMALS != 0 {
+        Mode::Radiance
+    } else {
+        Mode::Importance
+    };
     for wo in ways(measured) {
         // Well spread draws: their error is some thousandths.
-        let most = albedo(&k, wo, 4096).into_iter().fold(0.0, f64::max);
+        let most = albedo_in(&k, wo, 4096, mode)
+            .into_iter()
+            .fold(0.0, f64::max);
         suite.at_most(most, 1.03 + gain, || {
             format!("{name}, wo = {wo}: makes energy, albedo {most:.4}")
         });

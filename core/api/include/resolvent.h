@@ -1,7 +1,7 @@
 #ifndef RESOLVENT_H
 #define RESOLVENT_H
 
-/* The plugin ABI of Resolvent, version 1.2, for plugins in C and C++.
+/* The plugin ABI of Resolvent, version 1.3, for plugins in C and C++.
  *
  * A plugin is a shared library that exports one object, `resolvent_plugin`, a `resolvent_header` whose `table` holds the functions of
  * its kind:
@@ -83,7 +83,7 @@ typedef struct resolvent_spectrum {
 #define RESOLVENT_ABI_MAJOR 1
 
 /* The host accepts plugins of any minor version; it reads only what a table's size says is there. */
-#define RESOLVENT_ABI_MINOR 2
+#define RESOLVENT_ABI_MINOR 3
 
 /* Table is a `resolvent_medium_table`. */
 #define RESOLVENT_PLUGIN_KIND_MEDIUM 1
@@ -248,6 +248,11 @@ typedef struct resolvent_spectrum {
  * materials then, so integrators that join them disagree with those that don't. Since minor version 2. */
 #define RESOLVENT_BSDF_TRAITS_NON_RECIPROCAL 4
 
+/* Some lobes have normals of their own, made from `resolvent_surface_point.tangent`. What they carry in
+ * radiance mode has the cosine of `wi` with that normal, in importance mode that of `wo`, and so
+ * f(wo, wi) in one mode is η² f(wi, wo) in the other. Since minor version 3. */
+#define RESOLVENT_BSDF_TRAITS_OWN_NORMALS 8
+
 /* On the sensor. */
 #define RESOLVENT_VERTEX_KIND_SENSOR 0
 
@@ -373,6 +378,10 @@ typedef struct resolvent_surface_point {
   float outside_ior;
   /* Linear colour and opacity that the mesh has here; white where it has none. Textures ask for it. Since minor version 2. */
   float color[4];
+  /* Tangent space of normal maps: `n` is the shading normal before a normal map has turned it, `s` follows ∂p/∂u, and `t` is the
+   * direction of growing v, so that the three are left-handed where texture coordinates are mirrored. Filled in for BSDFs with
+   * the trait `RESOLVENT_BSDF_TRAITS_OWN_NORMALS` only. Since minor version 3. */
+  struct resolvent_frame tangent;
 } resolvent_surface_point;
 
 /* Services of the host. */

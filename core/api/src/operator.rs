@@ -20,7 +20,7 @@ use bytemuck::{Pod, Zeroable};
 ///
 /// Radiance arriving from `wi` is η² times as dense on its side, so a radiance walk carries f/η². That division, and the
 /// factor for shading normals, are applied in `resolvent_pathspace::scatter` and nowhere else; closures take the mode only to
-/// pass it on. The index comes from [`ScatterSample::eta`] for samples and from [`Scatter::eta`] for given pairs.
+/// pass it on, or for lobes with normals of their own ([`OWN_NORMALS`](crate::surface::bsdf_traits::OWN_NORMALS)). The index comes from [`ScatterSample::eta`] for samples and from [`Scatter::eta`] for given pairs.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {

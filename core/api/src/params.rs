@@ -271,6 +271,12 @@ impl<'a> Params<'a> {
         self.args.lanes
     }
 
+    /// Minor version of the ABI that the host was built with: what came with later ones is not there.
+    pub fn host_minor(&self) -> u32 {
+        // SAFETY: the host's table is valid for the life of the process.
+        unsafe { (*self.args.host).abi_minor }
+    }
+
     /// The host's services.
     pub fn host(&self) -> Host {
         Host {

@@ -64,7 +64,8 @@ impl Stream {
 #[inline(always)]
 pub fn exponential_fine(u: f32, key: u64) -> f64 {
     let tail = (mix(key) >> 35) as f64 * (1.0 / 536_870_912.0);
-    -(-(f64::from(u) + tail * (1.0 / 16_777_216.0))).ln_1p()
+    // The difference is exact, so the logarithm has all its digits, and costs a third of `ln_1p`.
+    -(1.0 - (f64::from(u) + tail * (1.0 / 16_777_216.0))).ln()
 }
 
 /// Exponential variate of unit rate from a uniform in [0, 1): −ln(1−u), finite since u < 1.

@@ -62,6 +62,11 @@ const COLOR: Use = Use {
     vertex_color: false,
 };
 
+const NORMAL: Use = Use {
+    space: ColorSpace::Linear,
+    ..COLOR
+};
+
 fn data(channel: TextureChannel, factor: f64) -> Use {
     Use {
         space: ColorSpace::Linear,
@@ -171,16 +176,12 @@ impl<'c> Materials<'c> {
         let normal_map = match m.get("normalTexture").filter(|_| !unlit) {
             Some(info) => {
                 let scale = number(info, "scale", 1.0, [-1e6, 1e6])?;
-                let linear = Use {
-                    space: ColorSpace::Linear,
-                    ..COLOR
-                };
-                let texture = self.texture(Some(info), &name, "normal", linear)?;
+                let texture = self.texture(Some(info), &name, "normal", NORMAL)?;
                 texture.map(|texture| NormalMap { texture, scale })
             }
             None => None,
         };
-        out.has_normal_map = normal_map.is_some();
+        out.has_normal_map |= normal_map.is_some();
         self.materials.insert(name, Material { block, normal_map });
         Ok(out)
     }
@@ -238,17 +239,14 @@ impl<'c> Materials<'c> {
             block = block.with("specular_color", either(texture, tint.into()));
         }
         if let Some(e) = of("KHR_materials_clearcoat") {
-            let factor = number(e, "clearcoatFactor", 0.0, UNIT)?;
+            let factor_of_coat = number(e, "clearcoatFactor", 0.0, UNIT)?;
             let info = e.get("clearcoatTexture");
-            block = self.scaled(block, info, name, "clearcoat", factor, Red)?;
+            block = self.scaled(block, info, name, "clearcoat", factor_of_coat, Red)?;
             let factor = number(e, "clearcoatRoughnessFactor", 0.0, UNIT)?;
             let info = e.get("clearcoatRoughnessTexture");
             block = self.scaled(block, info, name, "clearcoat_roughness", factor, Green)?;
-            if e.get("clearcoatNormalTexture").is_some() {
-                self.warn(
-                    "clearcoatNormalTexture",
-                    "the coat has the normals of its base",
-                );
+            if factor_of_coat > 0.0 {
+                block = self.coat_normal(block, m, e, name, out)?;
             }
         }
         if let Some(e) = of("KHR_materials_sheen") {
@@ -279,6 +277,32 @@ impl<'c> Materials<'c> {
             }
         }
         Ok(block)
+    }
+
+    /// The coat's normals: its own, or those of the mesh where only the base is bumpy (KHR_materials_clearcoat, "Clearcoat").
+    fn coat_normal(
+        &mut self,
+        block: PluginBlock,
+        m: &Value,
+        clearcoat: &Value,
+        name: &str,
+        out: &mut Converted,
+    ) -> Fallible<PluginBlock> {
+        let level = Param::from([0.5, 0.5, 1.0]);
+        let Some(info) = clearcoat.get("clearcoatNormalTexture") else {
+            let bumpy = m.get("normalTexture").is_some();
+            return Ok(if bumpy {
+                block.with("clearcoat_normal", level)
+            } else {
+                block
+            });
+        };
+        out.has_normal_map = true;
+        let texture = self.texture(Some(info), name, "clearcoat normal", NORMAL)?;
+        let scale = number(info, "scale", 1.0, [-1e6, 1e6])?;
+        Ok(block
+            .with("clearcoat_normal", either(texture, level))
+            .with("clearcoat_normal_scale", scale))
     }
 
     /// The medium inside: what white light becomes over a distance says how it absorbs.

@@ -74,6 +74,8 @@ fn every_parameter_arrives() {
     ] {
         assert_eq!(number(b, parameter), Some(value), "{parameter}");
     }
+    // Only the base is bumpy.
+    assert_eq!(color(b, "clearcoat_normal"), Some([0.5, 0.5, 1.0]));
     assert_eq!(color(b, "sheen_color"), Some([0.5, 0.0, 1.0]));
     assert_eq!(color(b, "specular_color"), Some([1.0, 2.0, 0.5]));
     assert_eq!(b.params["thin"].value, Value::Bool(false));
@@ -114,6 +116,29 @@ fn defaults_are_the_specifications() {
         assert_eq!(m.block.params.len(), 3);
     }
     assert!(model.textures.is_empty() && model.media.is_empty() && model.warnings.is_empty());
+}
+
+/// The coat's normal map is linear, has a scale, and makes tangents count.
+#[test]
+fn a_coat_has_its_own_normal_map() {
+    let mut b = Builder::new();
+    let image = b.push("images", json!({"uri": "n.png"}));
+    let index = b.push("textures", json!({"source": image}));
+    let coat =
+        json!({"clearcoatFactor": 1, "clearcoatNormalTexture": {"index": index, "scale": 0.25}});
+    let m = b.push(
+        "materials",
+        json!({"extensions": {"KHR_materials_clearcoat": coat}}),
+    );
+    let mesh = b.square(Some(m));
+    b.push("nodes", json!({"mesh": mesh}));
+    let model = b.read();
+    let m = &model.materials[0];
+    assert!(m.normal_map.is_none());
+    let map = &model.textures[texture(&m.block, "clearcoat_normal").unwrap()];
+    assert_eq!((map.color_space, map.scale), (ColorSpace::Linear, [1.0; 3]));
+    assert_eq!(number(&m.block, "clearcoat_normal_scale"), Some(0.25));
+    assert!(model.warnings.is_empty(), "{:?}", model.warnings);
 }
 
 #[test]

@@ -250,6 +250,38 @@ def test_open_pbr(tmp_path: Path) -> None:
     assert any("thin_film_weight" in x for x in converted.losses("/m/s"))
 
 
+BUMPS = """
+def Shader "i" { uniform token info:id = "ND_image_vector3"; asset inputs:file = @./t.png@; vector3f outputs:out }
+def Shader "n" { uniform token info:id = "ND_normalmap"; vector3f inputs:in.connect = </m/i.outputs:out>; float inputs:scale = 0.5; vector3f outputs:out }
+"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "coat", "normal", "coat_normal"),
+    [
+        ("ND_standard_surface_surfaceshader", "coat", "normal", "coat_normal"),
+        ("ND_open_pbr_surface_surfaceshader", "coat_weight", "geometry_normal", "geometry_coat_normal"),
+    ],
+)
+def test_normals_of_coats(tmp_path: Path, kind: str, coat: str, normal: str, coat_normal: str) -> None:
+    """They are never the base's: a map of their own, or the surface's."""
+    image(tmp_path)
+
+    def params(inputs: str) -> tuple[dict[str, Any], list[str]]:
+        material, converted = surface(tmp_path, inputs, BUMPS, kind)
+        return material["params"], [x for x in converted.losses("/m/s") if "normal" in x]
+
+    base, own = (f"vector3f inputs:{n}.connect = </m/n.outputs:out>" for n in (normal, coat_normal))
+    there = f"float inputs:{coat} = 1"
+    assert params(f"{there}; {base}")[0]["clearcoat_normal"] == [0.5, 0.5, 1.0]
+    for inputs in (f"{there}; {own}", f"{there}; {base}; {own}"):
+        found, losses = params(inputs)
+        assert found["clearcoat_normal"]["texture"] in ("m normal", "m coat normal") and found["clearcoat_normal_scale"] == 0.5 and not losses
+    for inputs in (there, base, own):
+        found, losses = params(inputs)
+        assert "clearcoat_normal" not in found and not losses
+
+
 def mats(*names: str) -> str:
     """Materials that differ in colour alone."""
     return "".join(

@@ -31,7 +31,10 @@ impl Trial {
         Self {
             name,
             spp,
-            ready: harness::open_sized("ajar/ajar.json", name, SIZE),
+            ready: harness::open_with("ajar/ajar.json", |s| {
+                s.integrator = resolvent_scene::PluginBlock::new(name);
+                s.film.resolution = SIZE;
+            }),
             seconds: Vec::new(),
             pictures: Vec::new(),
         }

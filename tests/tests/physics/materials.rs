@@ -267,7 +267,7 @@ fn an_index_matched_boundary() {
     out.assert();
 }
 
-/// A closed room of rough and layered materials, with glass and a body half of glass.
+/// A closed room of rough and layered materials, the floor with a coat that leans, with glass and a body half of glass.
 fn room(integrator: &str) -> Value {
     let mut scene = scenes::scene([0.0, 1.2, 4.6], [0.0, -0.07, -1.0]);
     scene["camera"] = scenes::camera([0.0, 1.2, 4.6], [0.0, -0.07, -1.0], 42.0);
@@ -275,7 +275,8 @@ fn room(integrator: &str) -> Value {
     scene["materials"] = json!({
         "wall": { "plugin": "diffuse", "params": { "reflectance": 0.7 } },
         "floor": { "plugin": "principled", "params": {
-            "base_color": [0.5, 0.3, 0.2], "clearcoat": 0.7, "clearcoat_roughness": 0.4 } },
+            "base_color": [0.5, 0.3, 0.2], "clearcoat": 0.7, "clearcoat_roughness": 0.4,
+            "clearcoat_normal": [0.65, 0.45, 0.95] } },
         "left": { "plugin": "principled", "params": {
             "base_color": [0.2, 0.2, 0.6], "roughness": 0.8, "sheen": 1, "sheen_roughness": 0.6 } },
         "right": { "plugin": "conductor", "params": {

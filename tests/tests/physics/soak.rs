@@ -2,7 +2,7 @@
 //!
 //! A million samples by default; `RESOLVENT_SOAK=1e9` takes that many.
 
-use crate::harness::build;
+use crate::harness::{build, open_small};
 use crate::scenes;
 use resolvent_tests::Moments;
 use serde_json::{Value, json};
@@ -73,10 +73,19 @@ fn nothing_breaks_drifts_or_grows() {
         .ok()
         .and_then(|v| v.parse().ok())
         .unwrap_or(if cfg!(debug_assertions) { 1e5 } else { 1e6 });
-    let ready: Vec<_> = mixture()
+    let mut ready: Vec<_> = mixture()
         .into_iter()
         .map(|(name, s)| (name, build(&s).unwrap_or_else(|e| panic!("{name}: {e}"))))
         .collect();
+    // Every material, a thousand lights, a plume that glows, and shafts of light.
+    for name in [
+        "materials/materials",
+        "lights/lights",
+        "bench/fire",
+        "bench/mist",
+    ] {
+        ready.push((name, open_small(&format!("{name}.json"))));
+    }
     // One round: 32 samples of all pixels of all scenes. `render` fails at samples that are not finite and at majorants too small.
     const SPP: u32 = 32;
     let round = f64::from(SPP) * f64::from(crate::harness::EDGE).powi(2) * ready.len() as f64;

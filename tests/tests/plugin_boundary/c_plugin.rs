@@ -111,7 +111,7 @@ fn layouts_agree() {
         "medium_point": MediumPoint { "lanes" = lanes },
         "surface_point": SurfacePoint {
             "ng" = ng, "frame" = frame, "uv" = uv, "lanes" = lanes, "outside_ior" = outside_ior,
-            "color" = color
+            "color" = color, "tangent" = tangent
         },
         "phase_table": PhaseTable { "create" = create, "closure" = closure },
         "bsdf_table": BsdfTable { "traits" = traits, "closure" = closure, "ior" = ior },

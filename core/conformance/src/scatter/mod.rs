@@ -11,6 +11,7 @@ mod samples;
 
 pub use density::Density;
 pub use edges::edges;
+pub use pairs::Symmetry;
 
 use crate::{Suite, property};
 use resolvent_api::math::DVec3;
@@ -64,12 +65,12 @@ pub fn check_around(
     suite.about(property::SAMPLING);
     samples::histogram(suite, &name, k, &density);
     samples::weights(suite, &name, k, &density, gain);
-    pairs::symmetry(suite, &name, k, wo, true);
+    pairs::symmetry(suite, &name, k, wo, Symmetry::Reciprocal);
     pairs::modes(suite, &name, k, wo);
 }
 
 /// What `plugin check` finds out about a closure of which nothing is known: as [`check_around`], also if it has delta lobes, and
-/// with the density against the walk by its own χ² test. `reciprocal` says that it claims to be.
+/// with the density against the walk by its own χ² test. `symmetry` is what it claims.
 pub fn examine(
     suite: &mut Suite,
     name: &str,
@@ -77,7 +78,7 @@ pub fn examine(
     measured: Measured,
     wo: Vec3,
     gain: f64,
-    reciprocal: bool,
+    symmetry: Symmetry,
 ) {
     let name = format!("{name}, wo = {wo}");
     let axis = match measured {
@@ -92,8 +93,19 @@ pub fn examine(
     suite.about(property::ADJOINT);
     let adjoint = Density::adjoint(k, measured, wo, axis, Mode::Importance);
     samples::histogram(suite, &format!("{name}, against the walk"), k, &adjoint);
-    pairs::symmetry(suite, &name, k, wo, reciprocal);
-    pairs::modes(suite, &name, k, wo);
+    pairs::symmetry(suite, &name, k, wo, symmetry);
+    if symmetry == Symmetry::Adjoint {
+        let light = Density::new(k, measured, wo, axis, Mode::Importance);
+        samples::weights(
+            suite,
+            &format!("{name}, from lights"),
+            k,
+            &light,
+            f64::INFINITY,
+        );
+    } else {
+        pairs::modes(suite, &name, k, wo);
+    }
     delta::pairs(suite, &name, k, wo);
 }
 
@@ -117,6 +129,11 @@ fn normalised(suite: &mut Suite, name: &str, measured: Measured, density: &Densi
 
 /// Mean weight of samples for `wo` per lane over `n` well spread draws: the albedo, also of delta lobes.
 pub fn albedo(k: &impl Scatter, wo: Vec3, n: u32) -> [f64; 4] {
+    albedo_in(k, wo, n, Mode::Importance)
+}
+
+/// As [`albedo`], in a mode: that of lobes with normals of their own is in radiance mode.
+pub fn albedo_in(k: &impl Scatter, wo: Vec3, n: u32, mode: Mode) -> [f64; 4] {
     let mut sum = [0.0; 4];
     for i in 0..n {
         // Roberts' sequence in three dimensions.
@@ -126,7 +143,7 @@ pub fn albedo(k: &impl Scatter, wo: Vec3, n: u32) -> [f64; 4] {
             dir: [at(0.671_043_606_703_789_2), at(0.549_700_477_901_970_3)]
                 .map(|u| u.min(1.0 - f32::EPSILON)),
         };
-        if let Some(s) = k.sample(wo, u, Mode::Importance) {
+        if let Some(s) = k.sample(wo, u, mode) {
             for (sum, w) in sum.iter_mut().zip(s.weight.0) {
                 *sum += f64::from(w) / f64::from(n);
             }

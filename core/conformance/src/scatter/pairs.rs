@@ -5,14 +5,26 @@ use crate::{Suite, property};
 use resolvent_api::rng::Stream;
 use resolvent_api::{Mode, Scatter, Vec3};
 
-/// Reciprocity, f(wo, wi) = η² f(wi, wo) with the index of the side of `wi` over that of `wo` (see [`Mode`]), and that the reverse density is the forward density of the swapped pair.
-/// Closures that are not `reciprocal`, and say so, still answer for their densities.
-pub fn symmetry(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3, reciprocal: bool) {
+/// How the values of the two senses of a pair of directions hang together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Symmetry {
+    /// f(wo, wi) = η² f(wi, wo), with the index of the side of `wi` over that of `wo` (see [`Mode`]).
+    Reciprocal,
+    /// The same, with the other mode on the right (`bsdf_traits::OWN_NORMALS`).
+    Adjoint,
+    /// Not at all (`bsdf_traits::NON_RECIPROCAL`).
+    None,
+}
+
+/// That [`Symmetry`], and that the reverse density is the forward density of the swapped pair.
+/// Closures that have none, and say so, still answer for their densities.
+pub fn symmetry(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3, symmetry: Symmetry) {
+    let back = match symmetry {
+        Symmetry::Adjoint => Mode::Importance,
+        Symmetry::Reciprocal | Symmetry::None => Mode::Radiance,
+    };
     for wi in directions(500, 0xd12) {
-        let (a, b) = (
-            k.eval(wo, wi, Mode::Radiance),
-            k.eval(wi, wo, Mode::Radiance),
-        );
+        let (a, b) = (k.eval(wo, wi, Mode::Radiance), k.eval(wi, wo, back));
         let eta2 = match (wo.z > 0.0, wi.z > 0.0) {
             (true, false) => k.eta().powi(2),
             (false, true) => k.eta().powi(-2),
@@ -39,7 +51,7 @@ pub fn symmetry(suite: &mut Suite, name: &str, k: &impl Scatter, wo: Vec3, recip
             suite.claim_about(property::EDGES, x.is_finite() && x >= 0.0, || {
                 format!("{name}: {what} is {x} at wi = {wi}")
             });
-            if property == property::RECIPROCITY && !reciprocal {
+            if property == property::RECIPROCITY && symmetry == Symmetry::None {
                 continue;
             }
             let agree = (x - y).abs() <= 1e-4 * x.abs().max(y.abs()) + 1e-12;

@@ -284,6 +284,12 @@ impl ForeignBsdf {
         self.traits & bsdf_traits::NULL != 0
     }
 
+    /// True if lobes have normals of their own, for which it asks for [`SurfacePoint::tangent`].
+    #[inline(always)]
+    pub fn has_own_normals(&self) -> bool {
+        self.traits & bsdf_traits::OWN_NORMALS != 0
+    }
+
     /// Writes the closure at a point into `out`.
     #[inline(always)]
     pub fn closure(&self, at: &SurfacePoint, out: &mut Closure) -> Call<()> {

@@ -2,6 +2,7 @@
 
 use crate::texture::Texture;
 use resolvent_api::math::{Frame, Vec3};
+use resolvent_api::surface::mapped_normal;
 use std::sync::Arc;
 
 /// A texture of normals in tangent space.
@@ -14,9 +15,6 @@ pub struct NormalMap {
     scale: f32,
 }
 
-/// Smallest cosine between a turned normal and the geometric one: the shading normal stays on the outer side.
-const LEAST_COSINE: f32 = 1e-3;
-
 impl NormalMap {
     /// A map with a factor on its slope.
     pub fn new(texture: Arc<Texture>, scale: f64) -> Self {
@@ -26,29 +24,14 @@ impl NormalMap {
         }
     }
 
-    /// The frame that the BSDF is given instead of `frame`. A normal that would point below the surface with geometric normal
-    /// `ng` is lifted until it points just above it.
-    pub fn turn(&self, frame: &Frame, ng: Vec3, uv: [f32; 2], mirrored: bool) -> Frame {
+    /// The frame that the BSDF is given instead of `frame`, in the tangent space `tangent`, whose normal is that of `frame`.
+    /// `ng` is the geometric normal.
+    pub fn turn(&self, frame: &Frame, tangent: &Frame, ng: Vec3, uv: [f32; 2]) -> Frame {
         let [r, g, b, _] = self.texture.at(uv, &[1.0; 4]);
-        let mut local = Vec3::new(
-            (2.0 * r - 1.0) * self.scale,
-            (2.0 * g - 1.0) * self.scale,
-            2.0 * b - 1.0,
-        );
-        if mirrored {
-            local.y = -local.y;
-        }
-        let n = frame.to_world(local);
-        let length = n.length();
         // A texel without direction says nothing.
-        if !(length > 0.0 && length.is_finite()) {
+        let Some(n) = mapped_normal(tangent, ng, [r, g, b], self.scale) else {
             return *frame;
-        }
-        let mut n = n / length;
-        let below = LEAST_COSINE - n.dot(ng);
-        if below > 0.0 {
-            n = (n + ng * (1.01 * below)).normalize_or(ng);
-        }
+        };
         let s = Vec3::from(frame.s);
         let s = s - n * n.dot(s);
         let l = s.length();
@@ -64,6 +47,17 @@ impl NormalMap {
             n: n.into(),
         }
     }
+}
+
+/// The tangent space of normal maps: the shading frame with `t` towards growing v.
+#[inline(always)]
+pub(super) fn tangent_space(frame: &Frame, mirrored: bool) -> Frame {
+    let t = if mirrored {
+        frame.t.map(|x| -x)
+    } else {
+        frame.t
+    };
+    Frame { t, ..*frame }
 }
 
 #[cfg(test)]
@@ -95,7 +89,9 @@ mod tests {
     fn components_follow_the_tangent_space() {
         let frame = Frame::around(Vec3::new(0.6, 0.0, 0.8));
         let ng = Vec3::from(frame.n);
-        let turn = |rgb, scale, mirrored| map(rgb, scale).turn(&frame, ng, [0.0; 2], mirrored);
+        let turn = |rgb, scale, mirrored| {
+            map(rgb, scale).turn(&frame, &tangent_space(&frame, mirrored), ng, [0.0; 2])
+        };
         let flat = turn([0.5, 0.5, 1.0], 1.0, false);
         assert!(close(flat.n, ng) && close(flat.s, frame.s.into()));
         // (0.6, 0, 0.8), (0, 0.6, 0.8), and the same with the texture's v running the other way.
@@ -117,7 +113,8 @@ mod tests {
         let ng = Vec3::Z;
         for i in 0..1000u32 {
             let c = |k: u32| ((i * 7919 + k * 104_729) % 1009) as f32 / 1008.0;
-            let f = map([c(0), c(1), c(2)], 3.0).turn(&frame, ng, [0.3, 0.4], i % 2 == 0);
+            let tangent = tangent_space(&frame, i % 2 == 0);
+            let f = map([c(0), c(1), c(2)], 3.0).turn(&frame, &tangent, ng, [0.3, 0.4]);
             let [s, t, n] = [f.s, f.t, f.n].map(Vec3::from);
             for (a, b, expected) in [
                 (s, s, 1.0),
@@ -131,7 +128,7 @@ mod tests {
             assert!(s.cross(t).dot(n) > 0.99 && n.dot(ng) > 0.0, "{f:?}");
         }
         // Nothing is said by a texel at the origin.
-        let f = map([0.5; 3], 1.0).turn(&frame, ng, [0.0; 2], false);
+        let f = map([0.5; 3], 1.0).turn(&frame, &frame, ng, [0.0; 2]);
         assert_eq!(f.n, frame.n);
     }
 }

@@ -1,5 +1,6 @@
 //! G for the whole scene: the next vertex along a ray, and connections to lights.
 
+use super::normal_map::tangent_space;
 use super::view::View;
 use super::{Scene, Surface, media};
 use crate::geometry::{Hit, Ray, SurfacePoint, offset_origin};
@@ -336,11 +337,14 @@ impl View<'_> {
             return Ok(next.flags & vertex_flags::EMITS != 0);
         };
         let material = &self.scene.materials[material as usize];
-        if let Some(map) = &material.normal_map
+        let mut tangent = next.frame;
+        if (material.normal_map.is_some() || material.bsdf.has_own_normals())
             && let Some(accel) = &self.scene.accel
         {
-            let mirrored = accel.uv_mirrored(at.shape, at.prim);
-            next.frame = map.turn(&next.frame, at.ng, next.uv, mirrored);
+            tangent = tangent_space(&tangent, accel.uv_mirrored(at.shape, at.prim));
+            if let Some(map) = &material.normal_map {
+                next.frame = map.turn(&next.frame, &tangent, at.ng, next.uv);
+            }
         }
         let point = BsdfPoint {
             p: next.p,
@@ -350,6 +354,7 @@ impl View<'_> {
             lanes: self.scene.lanes,
             outside_ior: self.scene.outside_ior(surface, next.inside),
             color: at.color,
+            tangent,
         };
         material
             .bsdf

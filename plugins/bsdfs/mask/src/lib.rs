@@ -97,8 +97,8 @@ impl Bsdf for Mask {
             Some(opacity) if self.resolved(opacity) == 0.0 => {
                 bsdf_traits::NULL | bsdf_traits::UNIFORM
             }
-            Some(_) => self.bsdf.traits() & (bsdf_traits::NULL | bsdf_traits::UNIFORM),
-            None => self.bsdf.traits() & bsdf_traits::NULL,
+            Some(_) => self.bsdf.traits(),
+            None => self.bsdf.traits() & !bsdf_traits::UNIFORM,
         }
     }
 

@@ -93,7 +93,9 @@ impl Bsdf for Mix {
         } else {
             0
         };
-        self.bsdfs[0].traits() & self.bsdfs[1].traits() & (bsdf_traits::NULL | uniform)
+        let [a, b] = [0, 1].map(|i| self.bsdfs[i].traits());
+        let of_either = bsdf_traits::NON_RECIPROCAL | bsdf_traits::OWN_NORMALS;
+        a & b & (bsdf_traits::NULL | uniform) | (a | b) & of_either
     }
 
     fn ior(&self) -> f32 {

@@ -41,7 +41,11 @@ impl Plugin for Part {
 impl Bsdf for Part {
     type Closure = Self;
     fn traits(&self) -> u32 {
-        bsdf_traits::UNIFORM
+        if self.kind == 7 {
+            bsdf_traits::OWN_NORMALS | bsdf_traits::NON_RECIPROCAL
+        } else {
+            bsdf_traits::UNIFORM
+        }
     }
     fn ior(&self) -> f32 {
         self.ior
@@ -254,6 +258,18 @@ fn each_part_keeps_its_index() {
             assert!((a - b).abs() < 1e-4 * b, "{lobe}: {a} {b}");
         }
     }
+}
+
+/// What one part is not, the mixture isn't.
+#[test]
+fn facts_of_parts_are_passed_on() {
+    let of = |a, b| {
+        let nested = [("a", part(a, 1.0)), ("b", part(b, 1.0))];
+        create_with::<Mix>("{}", &nested).unwrap().traits()
+    };
+    let both = bsdf_traits::OWN_NORMALS | bsdf_traits::NON_RECIPROCAL;
+    assert_eq!(of(0, 0), bsdf_traits::UNIFORM);
+    assert_eq!([of(7, 0), of(0, 7), of(7, 7)], [both; 3]);
 }
 
 #[test]

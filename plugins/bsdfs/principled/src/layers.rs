@@ -1,5 +1,6 @@
 //! What lies on top of the base: a coat of varnish, and fuzz on it.
 
+use crate::tilt::Tilt;
 use crate::{Parameters, sheen};
 use resolvent_api::math::warp;
 use resolvent_api::microfacet::exits::{self, Curve, NODES, Packed};
@@ -15,6 +16,8 @@ pub struct Layers {
     pub coat_eta: f32,
     /// Facets of the coat; `None`: smooth.
     pub coat_rough: Option<Reflector>,
+    /// Normal of the coat in the shading frame, if it has one of its own.
+    pub coat_tilt: Tilt,
     /// Logarithm of the colour that light has after two passages along the normal; 0 if clear.
     absorbs: Spectrum,
     pub fuzz: Spectrum,
@@ -32,6 +35,8 @@ pub struct Layers {
 /// What the layers do to light from one direction.
 #[derive(Clone, Copy)]
 pub struct Passed {
+    /// The direction in the coat's frame.
+    pub coat_way: Vec3,
     /// Transmittance of the fuzz, and of fuzz and coat, T.
     pub fuzz: f32,
     pub above: f32,
@@ -53,6 +58,7 @@ impl Layers {
             coat: p.clearcoat,
             coat_eta,
             coat_rough,
+            coat_tilt: p.clearcoat_normal.map_or(Tilt::NONE, Tilt::new),
             absorbs: p
                 .clearcoat_color
                 .map(|c| (1.0 + p.clearcoat * (c - 1.0)).max(1e-6).ln()),
@@ -131,20 +137,28 @@ impl Layers {
         o * i * self.inside_norm
     }
 
-    /// Transmittances of fuzz and coat at a cosine.
+    /// Transmittances of fuzz and coat at a cosine with the normal of both.
     #[inline(always)]
     pub fn transmittances(&self, mu: f32) -> [f32; 2] {
-        let fuzz = if self.fuzz.is_zero() {
+        [self.fuzz_passes(mu), self.coat_passes(mu)]
+    }
+
+    #[inline(always)]
+    fn fuzz_passes(&self, mu: f32) -> f32 {
+        if self.fuzz.is_zero() {
             1.0
         } else {
             1.0 - self.fuzz.max_lane() * sheen::albedo(mu, self.fuzz_roughness)
-        };
-        let coat = if self.coat == 0.0 {
+        }
+    }
+
+    #[inline(always)]
+    fn coat_passes(&self, mu: f32) -> f32 {
+        if self.coat == 0.0 {
             1.0
         } else {
             1.0 - self.coat * self.coat_share(mu)
-        };
-        [fuzz, coat]
+        }
     }
 
     /// Albedo of a coat that is fully there.
@@ -163,36 +177,40 @@ impl Layers {
     pub fn passed(&self, w: Vec3) -> Passed {
         if self.is_bare() || !self.covers(w) {
             return Passed {
+                coat_way: w,
                 fuzz: 1.0,
                 above: 1.0,
                 reflects: 1.0,
                 tint: Spectrum::ONE,
             };
         }
-        let mu = w.z.abs();
-        let [fuzz, coat] = self.transmittances(mu);
-        let above = fuzz * coat;
+        let coat_way = self.coat_tilt.enter(w);
+        let mu = coat_way.z.abs();
+        let fuzz = self.fuzz_passes(w.z.abs());
+        let above = fuzz * self.coat_passes(mu);
         Passed {
+            coat_way,
             fuzz,
             above,
-            reflects: above / self.under(w).max(1e-6),
+            reflects: above / self.under(w, mu).max(1e-6),
             tint: self.tint(mu),
         }
     }
 
-    /// The mean of h over exits of light from `w`. Between the axes the width that faces the light counts, as for masking.
+    /// The mean of h over exits of light from `w`, at the cosine `mu` with the coat's normal. Between the axes the width that faces
+    /// the light counts, as for masking.
     #[inline(always)]
-    fn under(&self, w: Vec3) -> f32 {
+    fn under(&self, w: Vec3, mu: f32) -> f32 {
         let [along, across] = &self.under;
         let [x, y] = self.widths;
         if x == y {
-            return along.at(w.z);
+            return along.at(mu);
         }
         let (x2, y2) = (w.x * w.x, w.y * w.y);
         let facing = ((x * x2 + y * y2) / (x2 + y2).max(1e-12)).sqrt();
         let (rx, ry) = (x.sqrt(), y.sqrt());
         let f = ((facing - ry) / (rx - ry)).clamp(0.0, 1.0);
-        along.at(w.z) * f + across.at(w.z) * (1.0 - f)
+        along.at(mu) * f + across.at(mu) * (1.0 - f)
     }
 
     /// Half a passage's worth of the coat's colour at normal incidence, longer the more obliquely light crosses the coat.

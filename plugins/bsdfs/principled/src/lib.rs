@@ -20,6 +20,8 @@
 //! | `clearcoat_ior` | float | | 1.5 | [1, 3] | its index of refraction |
 //! | `clearcoat_color` | spectrum | | 1 | [0, 1] | what white light has become after crossing it twice along the normal |
 //! | `clearcoat_darkening` | float | | 0 | [0, 1] | how much the base darkens and saturates by reflections within the coat |
+//! | `clearcoat_normal` | spectrum | | | [0, 1] | normal map of the coat: red, green and blue are components from −1 to 1 along growing u, growing v and the normal. `[0.5, 0.5, 1]` keeps the coat smooth over a bumpy base; not given, it follows the base |
+//! | `clearcoat_normal_scale` | float | | 1 | | factor on the first two components |
 //! | `sheen` | float | | 0 | [0, 1] | presence of fuzz on top of everything |
 //! | `sheen_color` | spectrum | | 1 | [0, 1] | its colour |
 //! | `sheen_roughness` | float | | 0.3 | [0, 1] | spread of its fibres |
@@ -35,21 +37,22 @@
 //! the boundary above it lets through in both directions, and facets under coat or fuzz what both passages leave over the mean
 //! passage ([`resolvent_api::microfacet::exits`]), for what the layers send back down is reflected again: a white base, metal, glass
 //! or not, loses nothing, to 1 %. Everything is reciprocal. With anisotropic facets under
-//! a layer, or fuzz on a rough coat, it is 2 %.
+//! a layer, or fuzz on a rough coat, it is 2 %. A coat with normals of its own is as shading normals are: its cosine is with them, walks
+//! from lights take the adjoint, and what it would reflect below the surface is lost.
 //!
 //! **OpenPBR 1.1** is `base_color` = base weight times colour, `diffuse_roughness`, `metallic`, `roughness`, `anisotropy`,
 //! `specular` and `specular_color`, `ior`, `edge_color` = specular colour of metals, `transmission`, `transmission_color` (without
 //! a depth; with one an `interior` medium, as for transmission scatter and subsurface), `clearcoat`, `_roughness`, `_ior`,
-//! `_color`, `_darkening`, `sheen…` for fuzz (another model of it), `thin`; opacity is `mask`. Not there: thin films, dispersion,
-//! normals and anisotropy of the coat, light that diffuses through thin walls, and the coat's influence on the roughness and index below
+//! `_color`, `_darkening`, `_normal`, `sheen…` for fuzz (another model of it), `thin`; opacity is `mask`. Not there: thin films, dispersion,
+//! anisotropy of the coat, light that diffuses through thin walls, and the coat's influence on the roughness and index below
 //! it (give the `ior` over that of the coat).
 //!
 //! **Sides.** Where light can enter a body, coat and fuzz are on its outside only; elsewhere both sides are alike. The body's index
 //! counts against what surrounds it. Emission belongs to the shape, absorption inside to its `interior` medium.
 //!
 //! **glTF** is `base_color`, `metallic`, `roughness`; KHR_materials_transmission `transmission`, with `thin` unless
-//! KHR_materials_volume gives a thickness; _ior `ior` (the special value 0 is `f0` = specular colour); _clearcoat, _sheen (with `sheen`
-//! 1); _specular `specular` and `specular_color`. **UsdPreviewSurface** is `base_color` = diffuseColor, `metallic`, `roughness`,
+//! KHR_materials_volume gives a thickness; _ior `ior` (the special value 0 is `f0` = specular colour); _clearcoat (whose
+//! normals are never those of the base), _sheen (with `sheen` 1); _specular `specular` and `specular_color`. **UsdPreviewSurface** is `base_color` = diffuseColor, `metallic`, `roughness`,
 //! `ior`, `clearcoat`, `clearcoat_roughness`; in its specular workflow `f0` = specularColor and `metallic` 0; `opacity` is the
 //! plugin `mask`, or `transmission` = 1 − opacity with `thin`.
 //!
@@ -64,13 +67,17 @@ mod sheen;
 mod surface;
 #[cfg(test)]
 mod tests;
+mod tilt;
 
 use resolvent_api::surface::bsdf_traits;
 use resolvent_api::{
     Bsdf, Decl, Error, ParamDecl, Params, Plugin, Spectrum, SurfacePoint, Textured, TexturedFloat,
-    TexturedSpectrum,
+    TexturedSpectrum, Vec3,
 };
 use surface::Surface;
+
+/// Minor version of the ABI that brought tangent spaces.
+const OWN_NORMALS_SINCE: u32 = 3;
 
 /// The parameters at a point.
 #[derive(Clone, Copy, Debug)]
@@ -93,6 +100,8 @@ pub struct Parameters {
     clearcoat_ior: f32,
     clearcoat_color: Spectrum,
     clearcoat_darkening: f32,
+    /// Of the coat, if it has one of its own: in the shading frame.
+    clearcoat_normal: Option<Vec3>,
     sheen: f32,
     sheen_color: Spectrum,
     sheen_roughness: f32,
@@ -128,6 +137,8 @@ pub struct Principled {
     clearcoat_ior: f32,
     clearcoat_color: TexturedSpectrum,
     clearcoat_darkening: TexturedFloat,
+    clearcoat_normal: Option<TexturedSpectrum>,
+    clearcoat_normal_scale: f32,
     sheen: TexturedFloat,
     sheen_color: TexturedSpectrum,
     sheen_roughness: TexturedFloat,
@@ -231,6 +242,20 @@ impl Plugin for Principled {
             "0",
             "how much reflections within the coat darken the base",
         ),
+        Decl::spectrum(
+            "clearcoat_normal",
+            "normal map of the coat, which follows the base if not given",
+        )
+        .at_least(0.0)
+        .at_most(1.0)
+        .texturable()
+        .build(),
+        Decl::float(
+            "clearcoat_normal_scale",
+            "factor on the slope of the coat's normals",
+        )
+        .default("1")
+        .build(),
         share("sheen", "0", "presence of fuzz"),
         colour("sheen_color", "1", "colour of the fuzz"),
         share("sheen_roughness", "0.3", "spread of the fuzz's fibres"),
@@ -262,11 +287,21 @@ impl Plugin for Principled {
             clearcoat_ior: params.float("clearcoat_ior")? as f32,
             clearcoat_color: colour("clearcoat_color")?,
             clearcoat_darkening: number("clearcoat_darkening")?,
+            clearcoat_normal: params.textured_spectrum("clearcoat_normal")?,
+            clearcoat_normal_scale: params.float("clearcoat_normal_scale")? as f32,
             sheen: number("sheen")?,
             sheen_color: colour("sheen_color")?,
             sheen_roughness: number("sheen_roughness")?,
             constant: None,
         };
+        if all.clearcoat.constant() == Some(0.0) {
+            all.clearcoat_normal = None;
+        }
+        if all.clearcoat_normal.is_some() && params.host_minor() < OWN_NORMALS_SINCE {
+            return Err(Error::new(
+                "'clearcoat_normal' needs a newer resolvent: this one does not tell tangent spaces",
+            ));
+        }
         if all.is_constant() {
             let parameters = all.resolve(&SurfacePoint::default());
             let lanes = params.lanes();
@@ -304,7 +339,8 @@ impl Principled {
             Some(self.sheen_color),
             Some(self.clearcoat_color),
         ];
-        numbers.iter().all(Textured::is_constant)
+        self.clearcoat_normal.is_none()
+            && numbers.iter().all(Textured::is_constant)
             && colours.iter().flatten().all(Textured::is_constant)
     }
 
@@ -329,10 +365,20 @@ impl Principled {
             clearcoat_ior: self.clearcoat_ior,
             clearcoat_color: self.clearcoat_color.at(at),
             clearcoat_darkening: self.clearcoat_darkening.at(at),
+            clearcoat_normal: self.coat_normal(at),
             sheen: self.sheen.at(at),
             sheen_color: self.sheen_color.at(at),
             sheen_roughness: self.sheen_roughness.at(at),
         }
+    }
+}
+
+impl Principled {
+    /// The coat's own normal in the shading frame.
+    fn coat_normal(&self, at: &SurfacePoint) -> Option<Vec3> {
+        let Spectrum([x, y, z, _]) = self.clearcoat_normal?.at(at);
+        let n = at.mapped_normal([x, y, z], self.clearcoat_normal_scale);
+        Some(n.map_or(Vec3::Z, |n| at.frame.to_local(n)))
     }
 }
 
@@ -342,6 +388,8 @@ impl Bsdf for Principled {
     fn traits(&self) -> u32 {
         if self.constant.is_some() {
             bsdf_traits::UNIFORM
+        } else if self.clearcoat_normal.is_some() {
+            bsdf_traits::OWN_NORMALS
         } else {
             0
         }

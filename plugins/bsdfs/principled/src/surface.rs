@@ -232,7 +232,9 @@ impl Surface {
         let mut choice = [0.0; LOBES];
         choice[FUZZ] =
             (1.0 - fuzz) * mean(self.layers.fuzz) / self.layers.fuzz.max_lane().max(1e-6);
-        choice[COAT] = fuzz - above;
+        if layers.coat_way.z * w.z > 0.0 {
+            choice[COAT] = fuzz - above;
+        }
         choice[BOUNDARY] = above * (self.opaque * mean(share) + metal);
         choice[DIFFUSE] = above * self.diffuse_mean * mean(base);
         let mut back = 0.0;
@@ -279,7 +281,7 @@ impl Surface {
 
     /// Value and densities, with what is known of both directions.
     #[inline]
-    fn evaluate(&self, wo: Vec3, wi: Vec3, po: &Passage, pi: &Passage) -> ScatterEval {
+    fn evaluate(&self, wo: Vec3, wi: Vec3, po: &Passage, pi: &Passage, mode: Mode) -> ScatterEval {
         let mut out = ScatterEval::default();
         let mut add = |lobe: usize, factor: Spectrum, e: ScatterEval| {
             out.f += e.f * factor;
@@ -317,11 +319,13 @@ impl Surface {
             }
             if layers.coat > 0.0
                 && let Some(coat) = &layers.coat_rough
+                && let Some(cosines) = self.coat_cosines(wo, wi, lo.coat_way, li.coat_way, mode)
             {
-                let e = coat.eval(wo, wi, |cos| {
+                let e = coat.eval(lo.coat_way, li.coat_way, |cos| {
                     Spectrum::splat(fresnel::dielectric(cos, layers.coat_eta).0)
                 });
-                add(COAT, Spectrum::splat(layers.coat * lo.fuzz.min(li.fuzz)), e);
+                let there = layers.coat * lo.fuzz.min(li.fuzz) * cosines;
+                add(COAT, Spectrum::splat(there), e);
             }
         }
         if let Some(rough) = &self.rough
@@ -336,6 +340,44 @@ impl Surface {
             add(DIFFUSE, f * reaches, same(1.0, i, o));
         }
         out
+    }
+
+    /// What a coat with a normal n of its own carries over one that follows the base: |n·ωi|/|ωi.z|, or the same of ωo in
+    /// importance mode. `None` where coat and base are not on the same side. `o` and `i` are the directions in the coat's frame.
+    #[inline(always)]
+    fn coat_cosines(&self, wo: Vec3, wi: Vec3, o: Vec3, i: Vec3, mode: Mode) -> Option<f32> {
+        if !self.layers.coat_tilt.is_some() {
+            return Some(1.0);
+        }
+        let (w, own) = match mode {
+            Mode::Radiance => (wi, i),
+            Mode::Importance => (wo, o),
+        };
+        // Along the surface the quotient grows without bound, the light it stands for not.
+        (o.z * wo.z > 0.0 && i.z * wi.z > 0.0).then(|| own.z.abs() / w.z.abs().max(1e-6))
+    }
+
+    /// Reflection by a smooth coat.
+    fn coat_mirror(&self, wo: Vec3, po: &Passage, mode: Mode) -> Option<ScatterSample> {
+        let layers = &self.layers;
+        let o = po.layers.coat_way;
+        let f = fresnel::dielectric(o.z.abs(), layers.coat_eta).0;
+        let weight = Spectrum::splat(layers.coat * po.layers.fuzz * f);
+        let mut s = self.mirror(wo, weight, po, COAT);
+        if layers.coat_tilt.is_some() {
+            let i = Vec3::new(-o.x, -o.y, o.z);
+            let wi = layers.coat_tilt.leave(i).normalize();
+            if wi.z * wo.z <= 0.0 {
+                return None;
+            }
+            let pi = self.passage(wi);
+            // Fuzz dims the pair as it does that of a rough coat; the cosines' quotient is that of the delta's weight.
+            let fuzz = po.layers.fuzz.min(pi.layers.fuzz) / po.layers.fuzz;
+            s.weight *= fuzz * self.coat_cosines(wo, wi, o, i, mode)? * wi.z / i.z;
+            s.wi = wi.into();
+            s.reverse = pi.choice[COAT];
+        }
+        Some(s)
     }
 
     /// Reflection in a single direction, of a weight besides the choice of the lobe.
@@ -371,12 +413,12 @@ fn narrowest(a: f32) -> f32 {
 
 impl Scatter for Surface {
     #[inline]
-    fn eval(&self, wo: Vec3, wi: Vec3, _: Mode) -> ScatterEval {
-        self.evaluate(wo, wi, &self.passage(wo), &self.passage(wi))
+    fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> ScatterEval {
+        self.evaluate(wo, wi, &self.passage(wo), &self.passage(wi), mode)
     }
 
     #[inline]
-    fn sample(&self, wo: Vec3, mut u: ScatterDraws, _: Mode) -> Option<ScatterSample> {
+    fn sample(&self, wo: Vec3, mut u: ScatterDraws, mode: Mode) -> Option<ScatterSample> {
         if wo.z == 0.0 {
             return None;
         }
@@ -390,12 +432,15 @@ impl Scatter for Surface {
                 Vec3::new(w.x, w.y, w.z * up)
             }
             COAT => match &self.layers.coat_rough {
-                Some(coat) => coat.sample(wo, u)?,
-                None => {
-                    let f = fresnel::dielectric(wo.z.abs(), self.layers.coat_eta).0;
-                    let weight = Spectrum::splat(self.layers.coat * po.layers.fuzz * f);
-                    return Some(self.mirror(wo, weight, &po, COAT));
+                Some(coat) => {
+                    let wi = coat.sample(po.layers.coat_way, u)?;
+                    let wi = self.layers.coat_tilt.leave(wi);
+                    if wi.z * wo.z <= 0.0 {
+                        return None;
+                    }
+                    wi
                 }
+                None => return self.coat_mirror(wo, &po, mode),
             },
             BOUNDARY => match &self.rough {
                 Some(rough) => rough.sample(wo, u)?,
@@ -417,7 +462,7 @@ impl Scatter for Surface {
         }
         // A cosine that rounding carried beyond 1 has no sine.
         let wi = Vec3::new(wi.x, wi.y, wi.z.clamp(-1.0, 1.0));
-        let e = self.evaluate(wo, wi, &po, &self.passage(wi));
+        let e = self.evaluate(wo, wi, &po, &self.passage(wi), mode);
         (e.forward > 0.0).then(|| ScatterSample {
             weight: e.f * (wi.z.abs() / e.forward),
             wi: wi.into(),

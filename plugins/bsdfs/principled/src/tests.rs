@@ -1,13 +1,14 @@
 //! Tests of the plugin.
 
 use super::*;
+use resolvent_api::math::Frame;
 use resolvent_api::math::warp::around_z;
 use resolvent_api::microfacet::fresnel;
 use resolvent_api::operator::{Measure, lobes};
 use resolvent_api::{Mode, Scatter, ScatterDraws, ScatterEval, Vec3};
 use resolvent_tests::Suite;
 use resolvent_tests::host::create;
-use resolvent_tests::scatter::{Measured, albedo, check_around, directions};
+use resolvent_tests::scatter::{Measured, Symmetry, albedo, check_around, directions, examine};
 
 fn surface(params: &str) -> Surface {
     let plugin: Principled = create(params).unwrap_or_else(|e| panic!("{params}: {e}"));
@@ -100,6 +101,108 @@ fn samples_follow_their_density() {
         check_around(&mut suite, params, &k, Measured::Bsdf, wo, Vec3::Z, 0.012);
     }
     suite.assert();
+}
+
+/// Over a bumpy base, with its own normals: a rough coat, one on both sides, one over glass and under fuzz.
+fn coated(params: &str) -> Surface {
+    let plugin: Principled = create(params).unwrap_or_else(|e| panic!("{params}: {e}"));
+    assert_eq!(plugin.traits(), bsdf_traits::OWN_NORMALS);
+    // The surface's own normal leans away from the base's.
+    let smooth = Frame::around(Vec3::new(0.25, -0.2, 0.95).normalize());
+    plugin.closure(&SurfacePoint {
+        ng: smooth.n,
+        tangent: smooth,
+        ..SurfacePoint::default()
+    })
+}
+
+/// A coat with normals of its own: χ², weights and densities in both modes, which are each other's adjoints.
+#[test]
+fn a_coat_may_have_its_own_normals() {
+    let mut suite = Suite::new();
+    for (params, wo) in [
+        (
+            r#"{ "base_color": 0.3, "roughness": 0.6, "clearcoat": 1, "clearcoat_roughness": 0.3,
+                 "clearcoat_normal": [0.5, 0.5, 1] }"#,
+            at(0.6, 0.3),
+        ),
+        (
+            r#"{ "base_color": 0.3, "metallic": 1, "roughness": 0.6, "clearcoat": 0.8, "clearcoat_roughness": 0.5,
+                 "clearcoat_normal": [0.7, 0.4, 0.9], "clearcoat_normal_scale": 0.5 }"#,
+            at(-0.4, 0.7),
+        ),
+        (
+            r#"{ "transmission": 0.7, "roughness": 0.5, "clearcoat": 1, "clearcoat_roughness": 0.6, "sheen": 0.5,
+                 "clearcoat_color": [0.9, 0.5, 0.3], "clearcoat_normal": [0.5, 0.5, 1] }"#,
+            at(0.15, 0.9),
+        ),
+        (
+            r#"{ "roughness": 0.6, "clearcoat": 1, "clearcoat_normal": [0.5, 0.5, 1], "sheen": 0.4 }"#,
+            at(0.6, 0.2),
+        ),
+    ] {
+        let k = coated(params);
+        examine(
+            &mut suite,
+            params,
+            &k,
+            Measured::Bsdf,
+            wo,
+            0.012,
+            Symmetry::Adjoint,
+        );
+    }
+    suite.assert();
+}
+
+/// The coat's mirror image is where its own normal says, as bright as Fresnel's law does, whatever the base's normal.
+#[test]
+fn a_smooth_coat_mirrors_about_its_normal() {
+    let k = coated(
+        r#"{ "base_color": 0, "specular": 0, "clearcoat": 1, "clearcoat_normal": [0.5, 0.5, 1] }"#,
+    );
+    let n = Vec3::new(0.25, -0.2, 0.95).normalize();
+    for wo in [at(0.9, 0.1), at(0.5, 0.6), at(0.7, 0.8)] {
+        let s = k.sample(wo, draw(0.0), Mode::Radiance).unwrap();
+        let mirrored = n * (2.0 * n.dot(wo)) - wo;
+        let wi = Vec3::from(s.wi);
+        assert!((wi - mirrored).length() < 2e-4, "{wi} {mirrored}");
+        let exact = fresnel::dielectric(n.dot(wo), 1.5).0;
+        let close = |a: f32, b: f32| (a / b - 1.0).abs() < 1e-3;
+        assert!(close(s.weight[0] * s.forward, exact), "{s:?} {exact}");
+        // From a light, with the cosines the other way round.
+        let back = k.sample(wi, draw(0.0), Mode::Importance).unwrap();
+        assert!((Vec3::from(back.wi) - wo).length() < 1e-5);
+        let adjoint = exact * wo.z / wi.z;
+        assert!(
+            close(back.weight[0] * back.forward, adjoint),
+            "{back:?} {adjoint}"
+        );
+        assert_eq!((s.forward, s.reverse), (back.reverse, back.forward));
+    }
+}
+
+/// Without anything that turns it, the coat's own normal is the base's.
+#[test]
+fn a_level_normal_changes_nothing() {
+    for rough in [0.0, 0.4] {
+        let params = |normal: &str| {
+            format!(
+                r#"{{ "roughness": 0.5, "anisotropy": 0.4, "clearcoat": 0.7, "clearcoat_roughness": {rough}, "sheen": 0.2{normal} }}"#
+            )
+        };
+        let own: Principled = create(&params(r#", "clearcoat_normal": [0.5, 0.5, 1]"#)).unwrap();
+        let (own, base) = (own.closure(&SurfacePoint::default()), surface(&params("")));
+        for wi in directions(50, 3) {
+            let wo = at(0.4, 0.3);
+            let [a, b] = [own, base].map(|k| k.eval(wo, wi, Mode::Radiance));
+            let near = |a: f32, b: f32| (a - b).abs() <= 1e-5 * b.abs();
+            assert!(
+                near(a.f[0], b.f[0]) && near(a.forward, b.forward),
+                "{a:?} {b:?}"
+            );
+        }
+    }
 }
 
 /// White furnace: white dielectrics, metals, glass and sheets lose nothing, from either side.

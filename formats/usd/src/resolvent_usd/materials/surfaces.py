@@ -90,14 +90,14 @@ class _Surface:
         self.node.claim.approximated(f"inputs:{weight}", f"it and {color} are both textures", "its mean is not known: taken as 1")
         return c
 
-    def read_normal(self, name: str) -> None:
-        """A texture of normals."""
+    def read_normal(self, name: str, of: str = "normal") -> Json | None:
+        """A texture of normals, and the factor on their slope if it is not 1."""
         link = self.node.link(name)
         if link is None:
             value = self.node.value(name)
             if value is not None and not np.allclose(np.asarray(value, dtype=float), _NORMAL_UP):
                 self.node.claim.skipped(f"inputs:{name}", "a constant normal is not there", "the surface's own normals are used")
-            return
+            return None
         inner = link.node
         scale = 1.0
         if kind_of(inner) == "normalmap":
@@ -110,14 +110,15 @@ class _Surface:
             value = self.builder.read(self.node, name, _NORMAL_UP).plus(1.0).times(0.5)
         if value.texture is None:
             self.node.claim.skipped(f"inputs:{name}", f"{inner.described} gives no texture of normals", "the surface's own are used")
-            return
+            return None
         texture = {"color_space": "raw", **value.texture}
         if texture["color_space"] == "srgb":
             self.node.claim.approximated(f"inputs:{name}", "the normals are said to be sRGB colours", "they are read so")
         value = Value(value.constant, texture, value.scale, value.bias)
-        self.normal = {"texture": self.builder.texture(f"{self.name} normal", value)}
+        found: Json = {"texture": self.builder.texture(f"{self.name} {of}", value)}
         if scale != 1.0:
-            self.normal["scale"] = scale
+            found["scale"] = scale
+        return found
 
     def look(self) -> Look:
         block: Json = {"plugin": "principled", "params": self.params}
@@ -168,7 +169,7 @@ def _preview(s: _Surface) -> Look:
         s.set("clearcoat_ior", Value(np.repeat(index, 3)), 1.5, 1.0, 3.0)
     _preview_opacity(s)
     s.emission = s.read("emissiveColor", 0.0)
-    s.read_normal("normal")
+    s.normal = s.read_normal("normal")
     s.without({"displacement": 0.0}, "the surface is smooth")
     if s.node.connected("occlusion") or not s.read("occlusion", 1.0).is_just(1.0):
         s.node.claim.skipped("inputs:occlusion", "light finds its own way into corners", "no effect")
@@ -224,6 +225,7 @@ class _Names:
     coat_uneven: dict[str, Any]
     """Of the coat's shape, with the values that make it even."""
     coat_rest: tuple[str, ...]
+    coat_normal: str
     film: str
     film_rest: tuple[str, ...]
     tangents: dict[str, Any]
@@ -242,8 +244,8 @@ STANDARD_SURFACE = _Names(
     subsurface_rest=("subsurface_color", "subsurface_radius", "subsurface_scale", "subsurface_anisotropy"),
     sheen="sheen", sheen_color="sheen_color", sheen_roughness=("sheen_roughness", 0.3),
     coat="coat", coat_roughness=0.1, coat_ior=("coat_IOR", 1.5), coat_darkening=None,
-    coat_uneven={"coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0, "coat_normal": _NORMAL_UP},
-    coat_rest=("coat_rotation",), film="thin_film_thickness", film_rest=("thin_film_IOR",),
+    coat_uneven={"coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0},
+    coat_rest=("coat_rotation",), coat_normal="coat_normal", film="thin_film_thickness", film_rest=("thin_film_IOR",),
     tangents={"specular_rotation": 0.0, "tangent": _X},
     thin="thin_walled", opacity="opacity", emission="emission", normal="normal",
 )  # fmt: skip
@@ -257,8 +259,8 @@ OPEN_PBR = _Names(
     subsurface_rest=("subsurface_color", "subsurface_radius", "subsurface_radius_scale", "subsurface_scatter_anisotropy"),
     sheen="fuzz_weight", sheen_color="fuzz_color", sheen_roughness=("fuzz_roughness", 0.5),
     coat="coat_weight", coat_roughness=0.0, coat_ior=("coat_ior", 1.6), coat_darkening="coat_darkening",
-    coat_uneven={"coat_roughness_anisotropy": 0.0, "geometry_coat_normal": _NORMAL_UP},
-    coat_rest=(), film="thin_film_weight", film_rest=("thin_film_thickness", "thin_film_ior"),
+    coat_uneven={"coat_roughness_anisotropy": 0.0},
+    coat_rest=(), coat_normal="geometry_coat_normal", film="thin_film_weight", film_rest=("thin_film_thickness", "thin_film_ior"),
     tangents={"geometry_tangent": _X, "geometry_coat_tangent": _X},
     # A luminance in nits; 1 shows as 1, as with lights.
     thin="geometry_thin_walled", opacity="geometry_opacity", emission="emission_luminance", normal="geometry_normal",
@@ -287,7 +289,8 @@ def _layered(s: _Surface, names: _Names) -> Look:
         s.params["thin"] = True
     s.opacity = s.read(names.opacity, 1.0)
     s.emission = s.product(names.emission, "emission_color", 0.0, 1.0)
-    s.read_normal(names.normal)
+    s.normal = s.read_normal(names.normal)
+    _coat_normal(s, names)
     return s.look()
 
 
@@ -327,6 +330,20 @@ def _coat(s: _Surface, names: _Names) -> None:
     if names.coat_darkening:
         s.set("clearcoat_darkening", s.read(names.coat_darkening, 1.0), 0.0)
     s.without(names.coat_uneven, "the coat is even")
+
+
+def _coat_normal(s: _Surface, names: _Names) -> None:
+    """The coat's normals are never the base's: a map of its own, or else the surface's."""
+    if "clearcoat" not in s.params:
+        s.ignore(names.coat_normal)
+        return
+    own = s.read_normal(names.coat_normal, "coat normal")
+    if own is not None:
+        s.params["clearcoat_normal"] = {"texture": own["texture"]}
+        if "scale" in own:
+            s.params["clearcoat_normal_scale"] = own["scale"]
+    elif s.normal is not None:
+        s.params["clearcoat_normal"] = [0.5, 0.5, 1.0]
 
 
 def _reflection(s: _Surface, metalness: str, weight: str) -> None:
