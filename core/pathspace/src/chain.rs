@@ -318,6 +318,32 @@ mod tests {
         }
     }
 
+    /// The first state is the sample's, also of numbers that are asked for late; and a walk that is not moved stays.
+    #[test]
+    fn a_chain_starts_as_its_sample() {
+        let mut draws = NetDraws::new(3, 5, 7, 3);
+        let camera = [0.1, 0.2, 0.3, 0.4];
+        let mut c = Chain::new(sizes(0.02, 0.02), 3);
+        c.start(8, Some(Origin { draws, camera }));
+        assert_eq!(c.hero(), draws.hero());
+        assert_eq!(c.four(End::Sensor, 0, Purpose::Camera), camera);
+        let places = [(End::Sensor, 3), (End::Light, 1), (End::Light, 6)];
+        for (k, (end, bounce)) in places.into_iter().enumerate() {
+            let p = Purpose::Scatter;
+            let expected = draws.four(end, bounce, p);
+            assert_eq!(c.four(end, bounce, p), expected);
+            assert_eq!(c.key(end, bounce, p), draws.key(end, bounce, p));
+            c.nudge(&[End::Sensor]);
+            assert_eq!(c.four(end, bounce, p) == expected, end == End::Light);
+            c.reject();
+            assert_eq!(c.four(end, bounce, p), expected, "place {k}");
+            // A large step that fails leaves the sample in place for what is still to be asked for.
+            c.leap();
+            assert_ne!(c.four(end, bounce, p), expected);
+            c.reject();
+        }
+    }
+
     #[test]
     fn rejection_restores_everything() {
         let mut c = Chain::new(sizes(0.02, 0.02), 3);
