@@ -5,8 +5,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The files that hold the ABI.
-const FILES: [&str; 10] = [
+const FILES: [&str; 13] = [
     "abi.rs",
+    "abi/params.rs",
+    "abi/scattering.rs",
+    "abi/scene.rs",
     "closure.rs",
     "operator.rs",
     "medium.rs",

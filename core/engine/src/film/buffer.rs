@@ -1,6 +1,6 @@
 //! The samples of one piece of work: a rectangle of pixels, and samples of one net.
 
-use super::fixed::{add, fits, fix};
+use super::fixed::{UNFIT, add, fits, fix};
 use super::orders::Layers;
 use super::splat::Splats;
 use resolvent_api::Spectrum;
@@ -113,7 +113,7 @@ impl Buffer {
         if !good {
             let [r, g, b, _] = s.radiance.0;
             return Err(format!(
-                "gave sample {} of pixel ({x}, {y}) the radiance {r:e} {g:e} {b:e} and the alpha {:e}, which is not finite or more than a film can hold",
+                "gave sample {} of pixel ({x}, {y}) the radiance {r:e} {g:e} {b:e} and the alpha {:e}, {UNFIT}",
                 self.samples.start + self.pixels[index].taken,
                 s.alpha
             ));

@@ -5,6 +5,9 @@ const FRACTION: i32 = 64;
 /// Largest magnitude a single value may have; beyond, it is rejected like an infinity. Leaves room for 2²³ samples.
 const LARGEST: f32 = 1e12;
 
+/// What is said of values that can't be added, after them.
+pub const UNFIT: &str = "which is not finite or more than a film can hold";
+
 /// True if a value can be added: it is finite, and not beyond [`LARGEST`].
 #[inline(always)]
 pub fn fits(v: f32) -> bool {

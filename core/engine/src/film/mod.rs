@@ -16,6 +16,7 @@ mod tile;
 pub use buffer::{Buffer, FeatureSums};
 pub use coverage::Coverage;
 pub use error::{Errors, Interval, student};
+pub(crate) use fixed::UNFIT;
 pub use splat::Splats;
 pub use tile::{Rect, TILE};
 

@@ -1,6 +1,6 @@
 //! One piece of work: an integrator's call, and where its samples go.
 
-use crate::film::Buffer;
+use crate::film::{Buffer, UNFIT};
 use crate::plugin::ForeignIntegrator;
 use crate::scene::{Counters, Scene, View};
 use resolvent_api::Spectrum;
@@ -95,7 +95,7 @@ impl Sink {
         {
             let ([x, y], [r, g, b, _]) = (film, radiance.0);
             return self.fail(format!(
-                "added the radiance {r:e} {g:e} {b:e} at ({x}, {y}) of the film, which is not finite or more than a film can hold"
+                "added the radiance {r:e} {g:e} {b:e} at ({x}, {y}) of the film, {UNFIT}"
             ));
         }
         Status::OK

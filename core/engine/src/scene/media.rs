@@ -3,8 +3,9 @@
 //! Extinctions add, so the collisions of overlapping media are independent Poisson processes: the nearest of the media's
 //! own collisions is the collision of the sum, and transmittances multiply. No medium needs to know another.
 
-use super::PlacedMedium;
+use super::hierarchy::Walk;
 use super::view::View;
+use super::{PlacedMedium, Scene};
 use resolvent_api::Vec3;
 use resolvent_api::abi::{Status, scene_traits};
 use resolvent_api::operator::{Flight, FlightDraws, Segment, flight_flags};
@@ -80,15 +81,10 @@ impl View<'_> {
 
     /// Transmittance of media that absorb only, as a flight that always arrives.
     fn fade(&self, s: &Segment, inside: u64, u: &FlightDraws) -> Result<(Flight, bool), Status> {
-        let inside = self.scene.interiors.filling(inside);
         let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
-        let mut near = self.scene.hierarchy.walk();
-        while let Some(i) = near.next(s) {
-            let m = &self.scene.media[i];
-            let Some(clipped) = within(m, inside, s) else {
-                continue;
-            };
-            let flight = self.transmittance(m, &clipped, &keyed(u, i))?;
+        let mut near = Near::of(self.scene, inside);
+        while let Some((i, m, part)) = near.next(s) {
+            let flight = self.transmittance(m, &part, &keyed(u, i))?;
             met = true;
             // The lanes share one estimate, so its density counts lane by lane (one that did not survive has value 0).
             joint.value *= flight.value;
@@ -113,18 +109,11 @@ impl View<'_> {
         inside: u64,
         u: &FlightDraws,
     ) -> Result<Passage, Status> {
-        let media = &self.scene.media;
-        let inside = self.scene.interiors.filling(inside);
         // Find the nearest collision; a flight that starts beyond what is already reached need not be sampled.
         let (mut reached, mut winner, mut met) = (s.t1, None, 0u32);
-        let mut near = self.scene.hierarchy.walk();
-        loop {
-            let cut = Segment { t1: reached, ..*s };
-            let Some(i) = near.next(&cut) else { break };
-            let Some(clipped) = within(&media[i], inside, &cut) else {
-                continue;
-            };
-            let flight = self.flight(&media[i], &clipped, &keyed(u, i))?;
+        let mut near = Near::of(self.scene, inside);
+        while let Some((i, m, part)) = near.next(&Segment { t1: reached, ..*s }) {
+            let flight = self.flight(m, &part, &keyed(u, i))?;
             met += 1;
             if flight.collided() && (flight.t < reached || winner.is_none()) {
                 (reached, winner) = (flight.t, Some(i));
@@ -140,14 +129,13 @@ impl View<'_> {
             && self.scene.traits & scene_traits::EMISSIVE_MEDIA != 0;
         // Replay everything up to there: the same numbers give the same flight, cut short.
         let mut joint = Flight::vacuum(reached);
-        let mut near = self.scene.hierarchy.walk();
+        let mut near = Near::of(self.scene, inside);
         // The winner's own segment may begin where it collides.
         let cut = Segment {
             t1: reached.next_up(),
             ..*s
         };
-        while let Some(i) = near.next(&cut) {
-            let m = &media[i];
+        while let Some((i, m, _)) = near.next(&cut) {
             let mut u = keyed(u, i);
             if alone {
                 let hero = u.prior[u.hero as usize];
@@ -156,10 +144,10 @@ impl View<'_> {
             }
             // The winner's segment must not be cut, or its collision would count as survival.
             let end = if winner == Some(i) { s.t1 } else { reached };
-            let Some(clipped) = within(m, inside, &Segment { t1: end, ..*s }) else {
+            let Some(part) = clip(m.medium.info.bounds, &Segment { t1: end, ..*s }) else {
                 continue;
             };
-            let flight = self.flight(m, &clipped, &u)?;
+            let flight = self.flight(m, &part, &u)?;
             joint.value *= flight.value;
             joint.track *= flight.track;
             joint.ratio *= flight.ratio;
@@ -209,14 +197,9 @@ impl View<'_> {
             }
             _ => {
                 let (mut joint, mut met) = (Flight::vacuum(s.t1), false);
-                let inside = self.scene.interiors.filling(inside);
-                let mut near = self.scene.hierarchy.walk();
-                while let Some(i) = near.next(s) {
-                    let m = &self.scene.media[i];
-                    let Some(clipped) = within(m, inside, s) else {
-                        continue;
-                    };
-                    let flight = self.transmittance(m, &clipped, &keyed(u, i))?;
+                let mut near = Near::of(self.scene, inside);
+                while let Some((i, m, part)) = near.next(s) {
+                    let flight = self.transmittance(m, &part, &keyed(u, i))?;
                     if flight.value.is_zero() {
                         return Ok(None);
                     }
@@ -233,17 +216,12 @@ impl View<'_> {
     /// Approximate optical depth of a segment.
     pub(super) fn depth(&self, s: &Segment, inside: u64) -> Result<Spectrum, Status> {
         let mut depth = Spectrum::ZERO;
-        let inside = self.scene.interiors.filling(inside);
-        let mut near = self.scene.hierarchy.walk();
-        while let Some(i) = near.next(s) {
-            let m = &self.scene.media[i];
-            let Some(clipped) = within(m, inside, s) else {
-                continue;
-            };
+        let mut near = Near::of(self.scene, inside);
+        while let Some((_, m, part)) = near.next(s) {
             self.count(|c| c.depths += 1);
             depth += m
                 .medium
-                .depth(&clipped)
+                .depth(&part)
                 .map_err(|f| self.medium_failed(&m.medium, &m.name, &f.0))?;
         }
         Ok(depth)
@@ -322,11 +300,37 @@ fn clip(bounds: Aabb, s: &Segment) -> Option<Segment> {
     Some(Segment { t0, t1, ..*s })
 }
 
-/// The part of a segment that a medium can act on; `filling` are the interiors that are not displaced.
-#[inline(always)]
-fn within(m: &PlacedMedium, filling: u64, s: &Segment) -> Option<Segment> {
-    if !m.free && filling & m.interiors == 0 {
-        return None;
+/// The media that segments of one ray meet.
+struct Near<'s> {
+    scene: &'s Scene,
+    walk: Walk<'s>,
+    /// The interiors that are not displaced.
+    filling: u64,
+}
+
+impl<'s> Near<'s> {
+    /// Where a ray is inside of the interiors `inside`.
+    #[inline(always)]
+    fn of(scene: &'s Scene, inside: u64) -> Self {
+        Self {
+            scene,
+            walk: scene.hierarchy.walk(),
+            filling: scene.interiors.filling(inside),
+        }
     }
-    clip(m.medium.info.bounds, s)
+
+    /// The next medium that can act on a segment, its number and the part that it can act on. Segments may get shorter from call
+    /// to call.
+    #[inline(always)]
+    fn next(&mut self, s: &Segment) -> Option<(usize, &'s PlacedMedium, Segment)> {
+        loop {
+            let i = self.walk.next(s)?;
+            let m = &self.scene.media[i];
+            if (m.free || self.filling & m.interiors != 0)
+                && let Some(part) = clip(m.medium.info.bounds, s)
+            {
+                return Some((i, m, part));
+            }
+        }
+    }
 }

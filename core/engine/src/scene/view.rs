@@ -3,6 +3,7 @@
 use super::{Scene, media};
 use crate::light::Reference;
 use crate::plugin::{ForeignMedium, pending_failure};
+use bytemuck::{Pod, Zeroable};
 use resolvent_api::abi::{SceneTable, Status, Text, scene_traits};
 use resolvent_api::math::Float3;
 use resolvent_api::operator::FlightDraws;
@@ -14,7 +15,8 @@ use std::cell::{Cell, RefCell};
 use std::ffi::c_void;
 
 /// What was done, counted per worker and summed at the end.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Counters {
     /// Rays traced against surfaces to find the nearest.
     pub rays: u64,
@@ -39,17 +41,7 @@ pub struct Counters {
 impl Counters {
     /// All counts, in the order of the fields.
     pub(crate) fn to_array(self) -> [u64; 9] {
-        [
-            self.rays,
-            self.shadow_rays,
-            self.flights,
-            self.transmittances,
-            self.depths,
-            self.collisions,
-            self.nulls,
-            self.lookups,
-            self.violations,
-        ]
+        bytemuck::cast(self)
     }
 
     /// The counts that [`Counters::to_array`] gave.
@@ -58,41 +50,14 @@ impl Counters {
         if all.iter().any(|n| *n > 1 << 60) {
             return None;
         }
-        let [
-            rays,
-            shadow_rays,
-            flights,
-            transmittances,
-            depths,
-            collisions,
-            nulls,
-            lookups,
-            violations,
-        ] = *<&[u64; 9]>::try_from(all).ok()?;
-        Some(Self {
-            rays,
-            shadow_rays,
-            flights,
-            transmittances,
-            depths,
-            collisions,
-            nulls,
-            lookups,
-            violations,
-        })
+        <[u64; 9]>::try_from(all).ok().map(bytemuck::cast)
     }
 
     /// Adds another's counts.
     pub fn add(&mut self, o: &Self) {
-        self.rays += o.rays;
-        self.shadow_rays += o.shadow_rays;
-        self.flights += o.flights;
-        self.transmittances += o.transmittances;
-        self.depths += o.depths;
-        self.collisions += o.collisions;
-        self.nulls += o.nulls;
-        self.lookups += o.lookups;
-        self.violations += o.violations;
+        let mut all = self.to_array();
+        all.iter_mut().zip(o.to_array()).for_each(|(a, b)| *a += b);
+        *self = bytemuck::cast(all);
     }
 }
 
