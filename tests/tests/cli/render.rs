@@ -19,6 +19,7 @@ fn every_example_renders() {
         assert!(mean(&image) > 0.005, "{name}: {}", mean(&image));
     };
     for name in [
+        "ajar/ajar.json",
         "caustic/caustic.json",
         "cloud/cloud.json",
         "fog-room/fog-room.json",

@@ -24,7 +24,7 @@ const DEPTH: &str = "bdpt by depth";
 struct Case {
     name: &'static str,
     scene: Value,
-    /// Samples per pixel of `pt`; the others have as many, `light` four times.
+    /// Samples per pixel of `pt`; the others have as many, `light` three times.
     spp: u32,
     /// What cannot see all of it, and why.
     without: &'static [(&'static str, &'static str)],
@@ -358,7 +358,7 @@ fn integrators_agree() {
         let reference = regions(&case.scene, &json!({ "plugin": "pt" }), spp);
         let one = reference.len() / (1 + LAYERS);
         let mut line = format!("agreement: {}", case.name);
-        for (integrator, factor) in [("bdpt", 1), (DEPTH, 1), ("mlt", 2), ("light", 3)] {
+        for (integrator, factor) in [("bdpt", 1), (DEPTH, 1), ("mlt", 1), ("light", 3)] {
             if let Some((_, why)) = case.without.iter().find(|w| w.0 == integrator) {
                 line += &format!(", without {integrator}: {why}");
                 continue;

@@ -148,7 +148,11 @@ pub fn open_small(path: &str) -> Ready {
     open_with(path, |s| s.film.resolution = [EDGE; 2])
 }
 
-fn open_with(path: &str, change: impl FnOnce(&mut resolvent_scene::Scene)) -> Ready {
+/// An example scene, by its path there, changed.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn open_with(path: &str, change: impl FnOnce(&mut resolvent_scene::Scene)) -> Ready {
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../scenes")
         .join(path);

@@ -8,6 +8,7 @@
 //! Figures are printed with `--nocapture`.
 
 mod agreement;
+mod gain;
 mod harness;
 mod judge;
 mod report;

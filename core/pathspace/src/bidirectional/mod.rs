@@ -7,10 +7,12 @@
 mod connect;
 mod depth;
 mod draws;
+mod every;
 pub mod path;
 mod subpath;
 pub mod verify;
 
 pub use connect::{Bidirectional, Splat};
 pub use draws::{Draws, End, NetDraws};
+pub use every::{Found, Pairs};
 pub use subpath::{Node, Subpath};

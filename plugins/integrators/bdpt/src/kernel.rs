@@ -3,12 +3,10 @@
 use resolvent_api::abi::{PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
 use resolvent_api::params::Host;
-use resolvent_api::rng::Stream;
-use resolvent_api::{Output, SceneView, VertexKind};
-use resolvent_pathspace::bidirectional::{Bidirectional, Draws, End, NetDraws};
+use resolvent_api::{Output, SceneView};
+use resolvent_pathspace::bidirectional::{Bidirectional, NetDraws, Pairs};
 use resolvent_pathspace::mis::{Heuristic, MediaDensities};
 use resolvent_pathspace::orders::Tally;
-use resolvent_pathspace::sampler::Purpose;
 use resolvent_pathspace::samples;
 
 /// What paths are made with.
@@ -81,75 +79,24 @@ impl Kernel<'_> {
         } else {
             paths.light.clear();
         }
-        if self.wants(0, 2) {
-            for (order, emitted) in paths.sensor.emitted.iter().enumerate() {
-                sample.radiance += *emitted;
-                tally.add(order, *emitted);
+        let pairs = Pairs {
+            limit,
+            connections: self.connections,
+            only: self.only,
+        };
+        paths.every(scene, draws, &pairs, self.connects(), |found| {
+            if let Some(film) = found.film {
+                return tally.splat(out, film, found.radiance, found.order());
             }
-        }
-        for t in 2..=paths.sensor.len() {
-            if self.wants(0, t) {
-                let light = paths.hit(scene, t)?;
-                sample.radiance += light;
-                tally.add(t - 2, light);
-            }
-            if t < limit && self.wants(1, t) && self.connects() {
-                let light = paths.next_event(scene, t, draws)?;
-                sample.radiance += light;
-                tally.add(t - 1, light);
-            }
-        }
-        for s in 2..=paths.light.len() {
-            if self.wants(s, 1)
-                && let Some(splat) = paths.project(scene, s, draws)?
-            {
-                tally.splat(out, splat.film, splat.radiance, s - 1)?;
-            }
-        }
-        self.join_all(paths, draws, limit, tally, &mut sample)?;
+            let light = found.radiance * (1.0 / found.share);
+            sample.radiance += light;
+            tally.add(found.order(), light);
+            Ok(())
+        })?;
         Ok(sample)
-    }
-
-    /// Joins every vertex of the sensor's walk to some of the light's. Long walks have too many pairs: each is kept with the
-    /// same probability.
-    fn join_all<T: Tally>(
-        &self,
-        paths: &mut Bidirectional,
-        draws: &mut NetDraws,
-        limit: usize,
-        tally: &mut T,
-        sample: &mut PixelSample,
-    ) -> Outcome<()> {
-        let inner = paths.light.len().saturating_sub(1);
-        if inner == 0 {
-            return Ok(());
-        }
-        let share = (self.connections / inner as f32).min(1.0);
-        let mut choice = Stream::new(draws.key(End::Light, 0, Purpose::Connection));
-        for t in 2..=paths.sensor.len() {
-            if paths.sensor.nodes()[t - 1].vertex.is(VertexKind::Emitter) {
-                continue;
-            }
-            for s in 2..=paths.light.len() {
-                if s + t > limit || !self.wants(s, t) {
-                    continue;
-                }
-                if share < 1.0 && choice.uniform() >= share {
-                    continue;
-                }
-                let light = paths.join(self.scene, s, t, draws)? * (1.0 / share);
-                sample.radiance += light;
-                tally.add(s + t - 2, light);
-            }
-        }
-        Ok(())
     }
 
     fn connects(&self) -> bool {
         self.scene.has(scene_traits::LIGHTS)
-    }
-
-    fn wants(&self, s: usize, t: usize) -> bool {
-        self.only[0].is_none_or(|o| o == s) && self.only[1].is_none_or(|o| o == t)
     }
 }
