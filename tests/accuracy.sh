@@ -42,4 +42,6 @@ mkdir -p docs
     echo "| absent | work that is not done |"
     echo "|---|---|"
     cat "$RESOLVENT_REPORT/skips.md"
+    echo
+    cat tests/long_runs.md
 } > docs/accuracy.md
