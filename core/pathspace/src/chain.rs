@@ -117,13 +117,15 @@ impl Chain {
         self.hero.0 = self.draw_hero();
     }
 
-    /// Proposes the next state, a small step away in the numbers of these walks; those of the other stay.
-    pub fn nudge(&mut self, walks: &[End]) {
+    /// Proposes the next state, a small step away in the numbers of these walks, by [`End`]; those of the other stay.
+    pub fn nudge(&mut self, walks: [bool; 2]) {
         self.propose(false);
         let Sizes { least, most } = self.sizes;
         let sigma = least * (most / least).powf(self.numbers.uniform());
-        for walk in walks {
-            self.moved[*walk as usize] += f64::from(sigma).powi(2);
+        for (moved, walk) in self.moved.iter_mut().zip(walks) {
+            if walk {
+                *moved += f64::from(sigma).powi(2);
+            }
         }
     }
 
@@ -262,7 +264,7 @@ mod tests {
     fn propose(c: &mut Chain, large: bool) {
         match large {
             true => c.leap(),
-            false => c.nudge(&[End::Sensor, End::Light]),
+            false => c.nudge([true, true]),
         }
     }
 
@@ -333,7 +335,7 @@ mod tests {
             let expected = draws.four(end, bounce, p);
             assert_eq!(c.four(end, bounce, p), expected);
             assert_eq!(c.key(end, bounce, p), draws.key(end, bounce, p));
-            c.nudge(&[End::Sensor]);
+            c.nudge([true, false]);
             assert_eq!(c.four(end, bounce, p) == expected, end == End::Light);
             c.reject();
             assert_eq!(c.four(end, bounce, p), expected, "place {k}");

@@ -175,8 +175,7 @@ impl<'c> Materials<'c> {
         }
         let normal_map = match m.get("normalTexture").filter(|_| !unlit) {
             Some(info) => {
-                let scale = number(info, "scale", 1.0, [-1e6, 1e6])?;
-                let texture = self.texture(Some(info), &name, "normal", NORMAL)?;
+                let (texture, scale) = self.normals(info, &name, "normal")?;
                 texture.map(|texture| NormalMap { texture, scale })
             }
             None => None,
@@ -279,6 +278,12 @@ impl<'c> Materials<'c> {
         Ok(block)
     }
 
+    /// A texture of normals, and the factor on their slope.
+    fn normals(&mut self, info: &Value, name: &str, what: &str) -> Fallible<(Option<String>, f64)> {
+        let scale = number(info, "scale", 1.0, [-1e6, 1e6])?;
+        Ok((self.texture(Some(info), name, what, NORMAL)?, scale))
+    }
+
     /// The coat's normals: its own, or those of the mesh where only the base is bumpy (KHR_materials_clearcoat, "Clearcoat").
     fn coat_normal(
         &mut self,
@@ -298,8 +303,7 @@ impl<'c> Materials<'c> {
             });
         };
         out.has_normal_map = true;
-        let texture = self.texture(Some(info), name, "clearcoat normal", NORMAL)?;
-        let scale = number(info, "scale", 1.0, [-1e6, 1e6])?;
+        let (texture, scale) = self.normals(info, name, "clearcoat normal")?;
         Ok(block
             .with("clearcoat_normal", either(texture, level))
             .with("clearcoat_normal_scale", scale))

@@ -6,9 +6,9 @@
 
 use crate::harness;
 use crate::scenes;
+use crate::student;
 use resolvent_tests::{Moments, Suite};
 use serde_json::{Value, json};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Edge of the film, and of a region.
 const EDGE: u32 = 24;
@@ -334,13 +334,10 @@ pub fn welch(a: &Moments, b: &Moments) -> f64 {
     if va + vb == 0.0 {
         return f64::from(u8::from(a.mean() == b.mean()));
     }
-    let freedom = (va + vb).powi(2)
-        / (va * va / (a.count() as f64 - 1.0) + vb * vb / (b.count() as f64 - 1.0));
     // Rounding of the sums.
     let gap = ((a.mean() - b.mean()).abs() - 1e-6 * a.mean().abs()).max(0.0);
-    let t = gap / (va + vb).sqrt();
-    let law = StudentsT::new(0.0, 1.0, freedom.max(1.0)).expect("degrees of freedom");
-    2.0 * (1.0 - law.cdf(t))
+    let freedom = |m: &Moments| m.count() as f64 - 1.0;
+    student::difference(gap, [(va, freedom(a)), (vb, freedom(b))]).1
 }
 
 #[test]

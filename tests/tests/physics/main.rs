@@ -31,6 +31,7 @@ mod stress_media;
 mod stress_places;
 mod stress_rest;
 mod stress_world;
+mod student;
 mod surfaces;
 mod transmittance;
 mod weights;

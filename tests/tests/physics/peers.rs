@@ -3,10 +3,9 @@
 //! `data/peers/blocks.json` has the means of blocks of 16 × 16 pixels and their standard errors. Ours come from the spread of
 //! several seeds, which makes no assumption on how a picture's pixels hang together. Default part: `surface_only`.
 
-use crate::harness;
+use crate::{harness, student};
 use resolvent_tests::{Moments, Suite};
 use serde_json::Value;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 const SEEDS: u64 = 8;
 
@@ -103,18 +102,15 @@ fn blocks_agree_with_other_renderers() {
                     assert!(gap.abs() < 1e-4 * exact.abs() + 1e-9, "{name} {k}: {gap}");
                     continue;
                 }
-                let variance = a * a + b * b;
-                let freedom = variance * variance
-                    / (a.powi(4) / (SEEDS as f64 - 1.0) + b.powi(4) / reference.freedom);
-                let t = gap / variance.sqrt();
-                let law = StudentsT::new(0.0, 1.0, freedom.max(1.0)).expect("degrees of freedom");
+                let parts = [(a * a, SEEDS as f64 - 1.0), (b * b, reference.freedom)];
+                let (t, p) = student::difference(gap, parts);
                 let what = format!(
                     "{name} {integrator}: {} +- {a:.1e}, {exact} +- {b:.1e} in block {} lane {}",
                     m.mean(),
                     k / reference.lanes,
                     k % reference.lanes
                 );
-                suite.p_value(what, 2.0 * (1.0 - law.cdf(t.abs())));
+                suite.p_value(what, p);
                 squares += t * t;
                 judged += 1;
                 worst = worst.max(t.abs());

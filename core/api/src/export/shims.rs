@@ -8,6 +8,7 @@ use crate::integrator::{Integrator, Output, SceneView};
 use crate::math::{Float3, Vec3};
 use crate::medium::{Medium, MediumInfo};
 use crate::operator::*;
+use crate::params::Host;
 use crate::phase::{MediumPoint, PhaseFunction};
 use crate::spectrum::Spectrum;
 use crate::surface::{Bsdf, SurfacePoint};
@@ -91,6 +92,19 @@ impl<C: Scatter + Copy + Send + Sync + 'static> ScatterShim<C> {
     }
 }
 
+/// Writes what `f` answers, or reports its panic.
+///
+/// # Safety
+/// `out` is valid for writing.
+#[inline(always)]
+unsafe fn give<T>(host: Host, out: *mut T, f: impl FnOnce() -> T) -> Status {
+    guarded(host, || {
+        // SAFETY: by contract.
+        unsafe { *out = f() };
+        Status::OK
+    })
+}
+
 /// The table of a medium.
 pub struct MediumShim<T>(PhantomData<T>);
 
@@ -111,11 +125,8 @@ impl<T: Plugin + Medium> MediumShim<T> {
     unsafe extern "C" fn info(p: *const c_void, out: *mut MediumInfo) -> Status {
         // SAFETY: a live instance and valid pointers, by the ABI; the same below.
         let i = unsafe { instance::<T>(p) };
-        guarded(i.host, || {
-            // SAFETY: `out` is valid for writing.
-            unsafe { *out = i.value.info() };
-            Status::OK
-        })
+        // SAFETY: `out` is valid for writing.
+        unsafe { give(i.host, out, || i.value.info()) }
     }
 
     unsafe extern "C" fn sample(
@@ -126,11 +137,8 @@ impl<T: Plugin + Medium> MediumShim<T> {
     ) -> Status {
         // SAFETY: as above.
         let (i, s, u) = unsafe { (instance::<T>(p), &*s, &*u) };
-        guarded(i.host, || {
-            // SAFETY: `out` is valid for writing.
-            unsafe { *out = i.value.sample(s, u) };
-            Status::OK
-        })
+        // SAFETY: `out` is valid for writing.
+        unsafe { give(i.host, out, || i.value.sample(s, u)) }
     }
 
     unsafe extern "C" fn transmit(
@@ -141,21 +149,15 @@ impl<T: Plugin + Medium> MediumShim<T> {
     ) -> Status {
         // SAFETY: as above.
         let (i, s, u) = unsafe { (instance::<T>(p), &*s, &*u) };
-        guarded(i.host, || {
-            // SAFETY: `out` is valid for writing.
-            unsafe { *out = i.value.transmit(s, u) };
-            Status::OK
-        })
+        // SAFETY: `out` is valid for writing.
+        unsafe { give(i.host, out, || i.value.transmit(s, u)) }
     }
 
     unsafe extern "C" fn depth(p: *const c_void, s: *const Segment, out: *mut Spectrum) -> Status {
         // SAFETY: as above.
         let (i, s) = unsafe { (instance::<T>(p), &*s) };
-        guarded(i.host, || {
-            // SAFETY: `out` is valid for writing.
-            unsafe { *out = i.value.depth(s) };
-            Status::OK
-        })
+        // SAFETY: `out` is valid for writing.
+        unsafe { give(i.host, out, || i.value.depth(s)) }
     }
 
     unsafe extern "C" fn coefficients(
@@ -165,11 +167,8 @@ impl<T: Plugin + Medium> MediumShim<T> {
     ) -> Status {
         // SAFETY: as above.
         let (i, at) = unsafe { (instance::<T>(p), Vec3::from(*at)) };
-        guarded(i.host, || {
-            // SAFETY: `out` is valid for writing.
-            unsafe { *out = i.value.coefficients(at) };
-            Status::OK
-        })
+        // SAFETY: `out` is valid for writing.
+        unsafe { give(i.host, out, || i.value.coefficients(at)) }
     }
 }
 

@@ -135,7 +135,7 @@ impl View<'_> {
             t1: reached.next_up(),
             ..*s
         };
-        while let Some((i, m, _)) = near.next(&cut) {
+        while let Some((i, m)) = near.any(&cut) {
             let mut u = keyed(u, i);
             if alone {
                 let hero = u.prior[u.hero as usize];
@@ -319,16 +319,25 @@ impl<'s> Near<'s> {
         }
     }
 
-    /// The next medium that can act on a segment, its number and the part that it can act on. Segments may get shorter from call
-    /// to call.
+    /// The next medium that is there and that a segment may meet, and its number; its bounds are still to be asked. Segments may get
+    /// shorter from call to call.
     #[inline(always)]
-    fn next(&mut self, s: &Segment) -> Option<(usize, &'s PlacedMedium, Segment)> {
+    fn any(&mut self, s: &Segment) -> Option<(usize, &'s PlacedMedium)> {
         loop {
             let i = self.walk.next(s)?;
             let m = &self.scene.media[i];
-            if (m.free || self.filling & m.interiors != 0)
-                && let Some(part) = clip(m.medium.info.bounds, s)
-            {
+            if m.free || self.filling & m.interiors != 0 {
+                return Some((i, m));
+            }
+        }
+    }
+
+    /// The next medium that can act on a segment, its number and the part that it can act on.
+    #[inline(always)]
+    fn next(&mut self, s: &Segment) -> Option<(usize, &'s PlacedMedium, Segment)> {
+        loop {
+            let (i, m) = self.any(s)?;
+            if let Some(part) = clip(m.medium.info.bounds, s) {
                 return Some((i, m, part));
             }
         }

@@ -25,7 +25,7 @@ pub struct Found {
     pub s: usize,
     /// Vertices from the sensor.
     pub t: usize,
-    /// Where on the film it falls, pixels (t = 1); else where the sensor's walk began.
+    /// Where on the film it falls, pixels, for t = 1; `None`: where the sensor's walk began.
     pub film: Option<[f32; 2]>,
     /// Weighted contribution.
     pub radiance: Spectrum,

@@ -82,10 +82,31 @@ pub struct Kernel<'a> {
     kept: [Subpath; 2],
     /// What the strategies of the sample in progress have found.
     seeds: Vec<Seed>,
-    /// First column and row of the window, its size, and both of the film that its pixels see.
+    /// First column and row of the window, and its size.
     window: [[f32; 2]; 2],
+    seen: Seen,
+}
+
+/// The film that pixels of the window see.
+#[derive(Clone, Copy)]
+struct Seen {
     corner: [f32; 2],
     extent: [f32; 2],
+}
+
+impl Seen {
+    /// The point that two numbers from 0 to 1 stand for, pixels.
+    fn at(&self, u: f32, v: f32) -> [f32; 2] {
+        [
+            self.corner[0] + u * self.extent[0],
+            self.corner[1] + v * self.extent[1],
+        ]
+    }
+
+    /// In pixels.
+    fn area(&self) -> f32 {
+        self.extent[0] * self.extent[1]
+    }
 }
 
 impl<'a> Kernel<'a> {
@@ -112,8 +133,10 @@ impl<'a> Kernel<'a> {
             ],
             seeds: Vec::new(),
             window: [[x0, y0], [x1 - x0, y1 - y0]],
-            corner: [x0 - m, y0 - m],
-            extent,
+            seen: Seen {
+                corner: [x0 - m, y0 - m],
+                extent,
+            },
         }
     }
 
@@ -198,10 +221,7 @@ impl<'a> Kernel<'a> {
         paths.sensor.clear();
         paths.light.clear();
         let [a, b, c, d] = origin.camera;
-        let film = [
-            self.corner[0] + a * self.extent[0],
-            self.corner[1] + b * self.extent[1],
-        ];
+        let film = self.seen.at(a, b);
         if let Some(ray) = scene.film_ray(film, [c, d])? {
             paths
                 .sensor
@@ -218,7 +238,7 @@ impl<'a> Kernel<'a> {
             connections: self.settings.connections,
             only: [None; 2],
         };
-        let area = self.extent[0] * self.extent[1];
+        let area = self.seen.area();
         let (seeds, lanes) = (&mut self.seeds, scene.lanes());
         paths.every(scene, &mut origin.draws, &pairs, connects, |found| {
             if found.order() > 0 {
@@ -301,14 +321,14 @@ impl<'a> Kernel<'a> {
     /// Proposes a small step in the numbers of both walks, or of one: that costs half as much, and fails less often.
     fn nudge(&mut self, pair: [usize; 2]) -> [bool; 2] {
         let choice = 3.0 * self.chain.uniform();
-        let (walked, ends): (_, &[End]) = match pair {
-            [0 | 1, _] => (SENSOR, &[End::Sensor]),
-            [_, 1] => (LIGHT, &[End::Light]),
-            _ if choice < 1.0 => (SENSOR, &[End::Sensor]),
-            _ if choice < 2.0 => (LIGHT, &[End::Light]),
-            _ => (BOTH, &[End::Sensor, End::Light]),
+        let walked = match pair {
+            [0 | 1, _] => SENSOR,
+            [_, 1] => LIGHT,
+            _ if choice < 1.0 => SENSOR,
+            _ if choice < 2.0 => LIGHT,
+            _ => BOTH,
         };
-        self.chain.nudge(ends);
+        self.chain.nudge(walked);
         walked
     }
 
@@ -373,10 +393,7 @@ impl<'a> Kernel<'a> {
                 .and_then(|splat| state([s, t], splat.film, splat.radiance, scene.lanes())));
         }
         let [a, b, c, d] = chain.four(End::Sensor, 0, Purpose::Camera);
-        let film = [
-            self.corner[0] + a * self.extent[0],
-            self.corner[1] + b * self.extent[1],
-        ];
+        let film = self.seen.at(a, b);
         if walked[0] {
             paths.sensor.clear();
             let Some(ray) = scene.film_ray(film, [c, d])? else {
@@ -399,7 +416,7 @@ impl<'a> Kernel<'a> {
                 _ => paths.join(scene, s, t, chain)?,
             };
         }
-        let area = self.extent[0] * self.extent[1];
+        let area = self.seen.area();
         Ok(state([s, t], film, radiance * area, scene.lanes()))
     }
 
