@@ -4,21 +4,27 @@ use super::sections::{MAGIC, VERSION};
 use super::*;
 use crate::film::Buffer;
 use crate::filter::Filter;
+use crate::render::unfinished;
 use resolvent_api::Spectrum;
 use resolvent_api::abi::PixelSample;
 use resolvent_api::rng::Stream;
 
 const WINDOW: [u32; 4] = [0, 0, 18, 5];
 
-/// A checkpoint with everything: features, splats, parts of nets; or halves and probes.
+/// A checkpoint with everything: features, splats, parts of nets; or halves, parts and probes.
 fn sample(adaptive: bool) -> Vec<u8> {
-    let mut film = if adaptive {
-        Film::in_halves(WINDOW, true)
+    let state = if adaptive {
+        unfinished()
     } else {
-        Film::new(WINDOW, true)
+        State::new(film())
     };
+    state.to_bytes(&json!({"scene": [1, 2]}), &json!({}))
+}
+
+fn film() -> Film {
+    let mut film = Film::new(WINDOW, true);
     let mut s = Stream::new(1);
-    for (k, samples) in [0..16, 16..32, 32..40].into_iter().enumerate() {
+    for samples in [0..16, 16..32, 32..40] {
         for rect in film.tiles() {
             let mut b = Buffer::new(rect.min, rect.max, samples.clone(), true);
             for y in rect.min[1]..rect.max[1] {
@@ -33,18 +39,11 @@ fn sample(adaptive: bool) -> Vec<u8> {
                     }
                 }
             }
-            if !adaptive {
-                b.splats.add([4.0, 3.0], Spectrum::ONE);
-            }
-            film.half(k == 1).merge(b, &Filter::Box(0.5)).unwrap();
+            b.splats.add([4.0, 3.0], Spectrum::ONE);
+            film.merge(b, &Filter::Box(0.5)).unwrap();
         }
     }
-    let adaptive = adaptive.then(|| Adaptive::new(0.1, film.tiles().len()));
-    let state = State {
-        adaptive,
-        ..State::new(film)
-    };
-    state.to_bytes(&json!({"scene": [1, 2]}), &json!({}))
+    film
 }
 
 /// Makes all checksums right that can be found by the lengths in the file.
@@ -156,7 +155,7 @@ fn what_is_foreign_is_told_apart() {
     assert!(why(b"\x76\x2f\x31\x01 an image").contains("no checkpoint"));
     let mut newer = sample(false);
     newer[8] = VERSION as u8 + 1;
-    assert!(why(&newer).contains("version 2"));
+    assert!(why(&newer).contains("version 3"));
     assert_eq!(newer[..8], MAGIC);
     // Sums that this program does not know would be lost.
     let mut out = sections::Writer::new(b"{\"window\": [0, 0, 1, 1], \"halves\": 1}");

@@ -9,6 +9,8 @@ mod piece;
 mod uniform;
 
 pub use adaptive::Adaptive;
+#[cfg(test)]
+pub(crate) use adaptive::tests::unfinished;
 
 use crate::checkpoint::State;
 use crate::error::{Error, Result};
