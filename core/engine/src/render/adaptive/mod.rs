@@ -118,14 +118,14 @@ impl Adaptive {
         let samples = after(self.round);
         let mut worst: f64 = 0.0;
         for tile in 0..self.counts.len() {
-            for half in 0..2 {
+            for (half, floor) in floors.into_iter().enumerate() {
                 let (second, other) = (half == 1, 1 - half);
                 let needed = match self.counts[tile][other] {
                     Some(count) => f64::from(count),
                     None => {
                         let error = match self.probes.get(&(tile, second)) {
-                            Some(probe) => probe.half_error(0, floors[half]),
-                            None => film.half(second).half_error(tile, floors[half]),
+                            Some(probe) => probe.half_error(0, floor),
+                            None => film.half(second).half_error(tile, floor),
                         };
                         let needed = needed(self.goal, samples, error);
                         self.counts[tile][other] = count(samples, needed);
@@ -135,11 +135,11 @@ impl Adaptive {
                 worst = worst.max(needed / f64::from(samples));
             }
             for (half, second) in [false, true].into_iter().enumerate() {
-                if !self.has_probe(tile, half) {
+                if self.has_probe(tile, half) {
+                    let cut = || film.half(second).cut(tile);
+                    self.probes.entry((tile, second)).or_insert_with(cut);
+                } else {
                     self.probes.remove(&(tile, second));
-                } else if !self.probes.contains_key(&(tile, second)) {
-                    let probe = film.half(second).cut(tile);
-                    self.probes.insert((tile, second), probe);
                 }
             }
         }
@@ -153,16 +153,11 @@ impl Adaptive {
         for (i, rect) in film.tiles().enumerate() {
             for (half, second) in [false, true].into_iter().enumerate() {
                 let net = nets::nth(2 * self.round + u32::from(second));
-                let part = match self.counts[i][half] {
-                    Some(n) => {
-                        net.start
-                            ..net
-                                .end
-                                .min(net.start.saturating_add(n.saturating_sub(before)))
-                    }
-                    None => net.clone(),
-                };
-                let missing = film.half(second).coverage(i).missing(part);
+                let end = self.counts[i][half].map_or(net.end, |n| {
+                    let left = n.saturating_sub(before);
+                    net.start.saturating_add(left).min(net.end)
+                });
+                let missing = film.half(second).coverage(i).missing(net.start..end);
                 let into = Into::Film { second };
                 out.extend(missing.into_iter().map(|r| (rect, i, r, into)));
                 if let Some(probe) = self.probes.get(&(i, second)) {

@@ -49,7 +49,7 @@ impl Adaptive {
         let rects: Vec<Rect> = film.tiles().collect();
         let mut count = || match f.u32()? {
             0 => Ok(None),
-            n if has_floors && n >= after(FIRST) && n % nets::SMALLEST == 0 => Ok(Some(n)),
+            n if has_floors && n >= after(FIRST) && n.is_multiple_of(nets::SMALLEST) => Ok(Some(n)),
             n => Err(format!("is damaged: half a tile cannot need {n} samples")),
         };
         let counts =

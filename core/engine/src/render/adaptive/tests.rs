@@ -89,7 +89,8 @@ fn adaptive(window: [u32; 4], seeds: [u64; 2], goal: f64, stops: bool) -> (Film,
 pub(crate) fn unfinished() -> State {
     let has_all = |s: &State| {
         let a = s.adaptive.as_ref().unwrap();
-        let cut = |i| s.film.coverage(i).ranges()[0].end % 32 > 0;
+        let last = |i| s.film.coverage(i).ranges().last().unwrap().end;
+        let cut = |i| nets::around(last(i) - 1).end != last(i);
         !a.probes.is_empty() && (0..a.counts.len()).any(cut)
     };
     for seed in 0..1000 {
