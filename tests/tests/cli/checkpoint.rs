@@ -264,7 +264,7 @@ fn kept(file: &Path) -> u64 {
 fn killed_renders_lose_nothing() {
     let full = std::env::var_os("RESOLVENT_FULL").is_some_and(|v| v == "1");
     let (kills, longer) = if full { (14, 6) } else { (2, 1) };
-    let budgets = [("256", "0.2"), ("128", ""), ("256", "")];
+    let budgets = [("256", "0.06"), ("128", ""), ("256", "")];
     let mut delays = Delays(1);
     let mut cases = Vec::new();
     for (shot, (spp, error)) in SHOTS.iter().zip(budgets) {

@@ -15,9 +15,11 @@ const CHAINS: &str = "pinhole/pinhole.json";
 #[test]
 fn threads_do_not_change_a_bit() {
     let at = folder("threads");
-    for name in SCENES.into_iter().chain([CHAINS]) {
+    let to_samples = |name| (name, ["--resolution", "50x34", "--spp", "20"]);
+    let to_error = |name| (name, ["--resolution", "36x20", "--error", "0.2"]);
+    let all = SCENES.into_iter().chain([CHAINS]).map(to_samples);
+    for (name, size) in all.chain([to_error("bench/cloud_sun.json")]) {
         let with = |threads: &str| {
-            let size = ["--resolution", "50x34", "--spp", "20"];
             let aovs = ["--aov", "depth,albedo,normal,variance,samples,orders:3"];
             let options = [&size[..], &aovs, &["--threads", threads]].concat();
             bits(&render(&at, &scene(name), "out.exr", &options))
