@@ -172,3 +172,29 @@ fn sharing_takes_most_of_the_noise() {
     );
     assert!(alone > 4.0 * shared, "{alone} to {shared}");
 }
+
+/// Pixels of a small film of this scene by `pt` with these parameters, on so many threads.
+fn pixels(scene: &Value, params: Value, threads: usize) -> Vec<[f64; 3]> {
+    let mut s = scene.clone();
+    s["film"]["resolution"] = json!([40, 24]);
+    s["integrator"] = pt(params);
+    let ready = harness::build(&s).unwrap_or_else(|e| panic!("{e}"));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let film = pool
+        .expect("threads")
+        .install(|| ready.render(7, 0, 32).film);
+    (0..40 * 24).map(|i| film.estimate(i).mean).collect()
+}
+
+/// Blocks are made of pixels and samples alone. Where there is a medium nothing is shared.
+#[test]
+fn sharing_is_deterministic_and_leaves_media_alone() {
+    let shared = |threads| pixels(&shiny(), json!({ "reuse": 3 }), threads);
+    assert_eq!(shared(1), shared(3));
+    let mut foggy = room(true);
+    let fog = json!({ "sigma_t": 0.7, "albedo": 0.9, "bounds": [-1, -1, -1, 1, 1, 1] });
+    scenes::medium(&mut foggy, "fog", fog);
+    let alone = pixels(&foggy, json!({}), 2);
+    assert_eq!(alone, pixels(&foggy, json!({ "reuse": 3 }), 2));
+    assert_ne!(shared(1), pixels(&shiny(), json!({}), 2));
+}
