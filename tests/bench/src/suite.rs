@@ -38,7 +38,7 @@ pub enum Source {
     Puffs,
     /// A thousand point lights.
     Lights,
-    /// `surface_only`, by `pt` with shared paths.
+    /// The scene whose converged picture this has, by `pt` with shared paths.
     Reuse,
 }
 
@@ -68,6 +68,16 @@ pub struct Case {
     pub mode: Mode,
 }
 
+impl Case {
+    /// The case that has the same converged picture.
+    fn picture(&self) -> &'static str {
+        match self.converged {
+            Converged::Of(name) => name,
+            _ => self.name,
+        }
+    }
+}
+
 const fn case(name: &'static str, mode: Mode, purpose: &'static str) -> Case {
     Case {
         name,
@@ -75,6 +85,14 @@ const fn case(name: &'static str, mode: Mode, purpose: &'static str) -> Case {
         source: Source::File,
         converged: Converged::Stored,
         mode,
+    }
+}
+
+const fn reuse(name: &'static str, of: &'static str, purpose: &'static str) -> Case {
+    Case {
+        source: Source::Reuse,
+        converged: Converged::Of(of),
+        ..case(name, Mode::Quick, purpose)
     }
 }
 
@@ -133,20 +151,21 @@ pub const CASES: &[Case] = &[
         Mode::Quick,
         "Thin fog in a box with an area light: surfaces and a medium share the light.",
     ),
+    reuse(
+        "fog_reuse",
+        "box_fog",
+        "The same by `pt` with `reuse` 4: blocks of pixels share what their paths find.",
+    ),
     case(
         "surface_only",
         Mode::Smoke,
         "The same box without any medium: what surfaces alone cost.",
     ),
-    Case {
-        source: Source::Reuse,
-        converged: Converged::Of("surface_only"),
-        ..case(
-            "surface_reuse",
-            Mode::Quick,
-            "The same by `pt` with `reuse` 4: blocks of pixels share what their paths find.",
-        )
-    },
+    reuse(
+        "surface_reuse",
+        "surface_only",
+        "The same by `pt` with `reuse` 4: blocks of pixels share what their paths find.",
+    ),
     Case {
         source: Source::Lights,
         ..case(
@@ -246,7 +265,8 @@ impl Suite {
             Source::Puffs => generate::puffs(1000, 0.18, [96, 72]),
             Source::Lights => generate::lights(1000, MADE),
             Source::Reuse => {
-                let plain = self.root.join("scenes/bench/surface_only.json");
+                let plain = self.root.join("scenes/bench");
+                let plain = plain.join(format!("{}.json", case.picture()));
                 let mut scene = generate::read(&plain)?;
                 scene["integrator"]["params"]["reuse"] = 4.into();
                 scene
@@ -258,13 +278,9 @@ impl Suite {
 
     /// Where the converged picture is stored.
     pub fn reference_path(&self, case: &Case) -> PathBuf {
-        let name = match case.converged {
-            Converged::Of(name) => name,
-            _ => case.name,
-        };
         self.root
             .join("tests/bench/references")
-            .join(format!("{name}.exr"))
+            .join(format!("{}.exr", case.picture()))
     }
 
     /// The converged picture at a scene's resolution divided by `coarser`.

@@ -51,7 +51,7 @@ pub struct Walk {
     /// Contribution and density.
     pub beta: Throughput,
     /// S: density of the ways through branches, relative to the walk's.
-    others: f32,
+    pub others: f32,
     /// How the current direction was found.
     pub found: Found,
     /// Scattering events so far.
@@ -60,7 +60,7 @@ pub struct Walk {
     pub shared: [f32; 2],
     /// Density of the current direction around the sun relative to isotropic, at least 1: what the light still to come
     /// is expected to be worth.
-    promise: f32,
+    pub promise: f32,
 }
 
 impl Walk {
@@ -205,7 +205,7 @@ impl Kernel<'_> {
     /// Accounts for a new direction `wi`, chosen with density `q` at `here`: its share of the ways through branches, and
     /// what it promises.
     #[inline(always)]
-    fn turn(
+    pub fn turn(
         &self,
         walk: &mut Walk,
         here: &Vertex,

@@ -8,7 +8,7 @@
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events after which a path ends, −1: none. A limit makes the picture darker than it should be |
 //! | `sample_lights` | bool | true | connect vertices to lights. Without, light is only met by scattering: cheaper where lights fill much of the view, as the sky does round a thick cloud, and blind to point and sun lights |
-//! | `reuse` | int 1…8 | 1 | edge, in pixels, of the blocks whose paths share all that they find beyond their second vertices, 1: none. In scenes without media; not for layers by scattering order |
+//! | `reuse` | int 1…8 | 1 | edge, in pixels, of the blocks whose paths share all that they find beyond their second vertices, 1: none. Not where media tell lanes apart, nor for layers by scattering order |
 //! | `branching` | float 0…1 | 0.25 | probability of a branch towards the sun at a vertex in a medium; the picture's mean does not depend on it |
 //!
 //! ```json
@@ -53,7 +53,7 @@ impl Plugin for PathTracer {
         .build(),
         Decl::int(
             "reuse",
-            "edge, in pixels, of the blocks whose paths share what they find beyond their second vertices (scenes without media); 1: none",
+            "edge, in pixels, of the blocks whose paths share what they find beyond their second vertices (where media are grey); 1: none",
         )
         .default("1")
         .at_least(1.0)
@@ -91,7 +91,7 @@ impl Integrator for PathTracer {
             sun,
             branching: self.branching,
         };
-        if self.reuse > 1 && out.orders() == 0 && !scene.has(scene_traits::MEDIA) {
+        if self.reuse > 1 && out.orders() == 0 && scene.is_grey() {
             return reuse::render(&kernel, self.reuse, tile, out);
         }
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.

@@ -2,16 +2,25 @@
 //! Paths").
 //!
 //! A block of pixels takes one sample of each at a time. Every path has a first vertex y_k, seen from the camera, and a second, x_k,
-//! chosen at y_k with density p_k. The light that reaches x_i is what any y_k would find there, if nothing is in between: so all y_k
-//! are connected to all x_i. A path (y_k, x_i, …) may thus have come about by scattering at any first vertex that sees x_i; the
-//! balance heuristic over all of these, and at x_i over scattering and connecting as ever, divides its contribution by
+//! on a surface or in a medium. The light that reaches x_i is what any y_k would find there: so all y_k are connected to all x_i.
+//! A path (y_k, x_i, …) may thus have come about by scattering at any first vertex; the balance heuristic over all of these, and at x_i
+//! over scattering and connecting as ever, divides its contribution by
 //!
-//!   Σ over k of V(y_k, x_i) p_k(x_i) q(x_i; wo_k, wi)
+//!   Σ over k of p_k(x_i) ρ_k q(x_i; wo_k, wi)
 //!
-//! with q the density of the direction `wi` at x_i, seen from y_k. Given the first vertices, each x_i is an independent sample: no
-//! pixel is biased. But the errors of a block's pixels are alike, which those of other pixels are not.
+//! with p_k the density of the direction from y_k to x_i times the geometry term, and q that of the direction `wi` at x_i, seen from y_k.
+//! ρ_k is what the media leave of light between the two, 0 behind a surface. It is estimated once for every pair, by null collisions:
+//! for k = i they are those of the flight that found x_i, for the others those of a connection. Together with x_i, the null
+//! collisions of all these edges are the point of a space in which every y_k could have made the flight and all others the connections;
+//! the densities of both are known (Miller et al. 2019), and what divides one by the other is ρ_k = track/ratio. Edges that a path does not
+//! have integrate to 1. So the weights are exact, and at most 1.
 //!
-//! Only what a smooth density chose can be shared. A path that a delta lobe turns at y or at x goes on alone.
+//! Given the first vertices, each x_i is an independent sample: no pixel is biased. But the errors of a block's pixels are
+//! alike, which those of other pixels are not.
+//!
+//! Only what a smooth density chose can be shared: a path that a delta lobe turns at y or at x goes on alone. So does light that is
+//! found by fewer than two scatterings. Media must be grey, since the hero lane of one path is not that of another; and no branches towards
+//! the sun leave from y and x, whose weights would tie the two ends of a path together.
 
 mod path;
 mod share;
@@ -41,12 +50,18 @@ struct Member {
     pixel: [u32; 2],
     sample: PixelSample,
     sampler: Sampler,
-    /// Weight of the camera's ray.
-    weight: f32,
+    /// What the camera makes of light scattered at the first vertex: the ray's weight, in a medium times its albedo.
+    weight: Spectrum,
     first: Vertex,
     second: Vertex,
     /// The first vertex can be connected to second ones.
     connects: bool,
+    /// Density of the edge between the two by flight over that by connection.
+    clear: f32,
+    /// Albedo of the medium at the second vertex, or 1.
+    albedo: Spectrum,
+    /// For the roulette of its connection to a light.
+    chance: f32,
     /// The second can be connected to first ones.
     shares: bool,
     /// A point on a light chosen for the second vertex; whether anything is in between is not known yet.
@@ -60,7 +75,10 @@ impl Member {
             pixel: [0; 2],
             sample: PixelSample::default(),
             sampler: Sampler::new(0, 0, 0, 1),
-            weight: 0.0,
+            weight: Spectrum::ZERO,
+            clear: 1.0,
+            albedo: Spectrum::ONE,
+            chance: 0.0,
             first: Vertex::empty(),
             second: Vertex::empty(),
             connects: false,
