@@ -18,6 +18,7 @@ pub mod medium;
 pub mod microfacet;
 pub mod nested;
 pub mod operator;
+mod panics;
 pub mod params;
 pub mod phase;
 pub mod rng;

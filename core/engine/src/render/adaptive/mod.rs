@@ -27,7 +27,7 @@ use rayon::prelude::*;
 use resolvent_pathspace::nets;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::Ordering;
 
 /// Rounds, a net of each half, before the first decision. Of two nets, too many have missed what is rare: in a caustic found by
 /// chance, decisions by two leave 1.5 times the variance for the same work as decisions by three.
@@ -178,26 +178,20 @@ pub fn run(job: &Job, goal: f64) -> bool {
         let (pieces, tiles, left) = {
             let mut state = job.state();
             let state = &mut *state;
-            let Some(a) = &state.adaptive else {
-                return uniform::run(job);
-            };
+            let Some(a) = &state.adaptive else { break };
             let left = a.left();
             if left == 0 || nets::nth(2 * a.round + 1).end > job.settings.samples.end {
                 return true;
             }
             (a.pieces(&mut state.film), a.counts.len(), left)
         };
-        let finished = AtomicUsize::new(0);
+        // Nothing is known before the first decision.
+        let known = worst.is_finite().then_some(worst);
+        let done = known.map_or(0.0, |e| (goal / e).powi(2));
+        let done = done.min(1.0 - left as f64 / tiles as f64);
         pieces.par_iter().for_each(|(rect, i, samples, into)| {
             if job.piece(*rect, *i, samples.clone(), *into) {
-                finished.fetch_add(1, Ordering::Relaxed);
-                let done = if worst.is_finite() {
-                    (goal / worst).powi(2)
-                } else {
-                    0.0
-                };
-                let known = worst.is_finite().then_some(worst);
-                job.report(done.min(1.0 - left as f64 / tiles as f64), known);
+                job.report(done, known);
             }
         });
         if job.is_stopped() {
@@ -205,9 +199,7 @@ pub fn run(job: &Job, goal: f64) -> bool {
         }
         let mut state = job.state();
         let state = &mut *state;
-        let Some(a) = &mut state.adaptive else {
-            continue;
-        };
+        let Some(a) = &mut state.adaptive else { break };
         worst = a.decide(&mut state.film);
         if a.round <= FIRST && state.film.has_splats() {
             state.adaptive = None;
@@ -215,9 +207,10 @@ pub fn run(job: &Job, goal: f64) -> bool {
                 job.fail(why);
                 return false;
             }
-            continue;
         }
         let least = state.film.least_samples();
         job.samples.store(least.into(), Ordering::Relaxed);
     }
+    // The film is one now, and its tiles are sampled alike.
+    uniform::run(job)
 }
