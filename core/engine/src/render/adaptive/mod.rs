@@ -29,8 +29,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::atomic::Ordering;
 
-/// Rounds, a net of each half, before the first decision. Of two nets, too many have missed what is rare: in a caustic found by
-/// chance, decisions by two leave 1.5 times the variance for the same work as decisions by three.
+/// Rounds, a net of each half, before the first decision. Of two nets, too many have missed what is rare: where a caustic is found
+/// by chance, decisions by two take nearly twice the work for the same error.
 const FIRST: u32 = 3;
 /// Share of the samples by which their number is decided. More of them decide better and waste more: between a half and three
 /// quarters the work for a given error hardly differs.
