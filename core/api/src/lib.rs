@@ -17,6 +17,7 @@ pub mod math;
 pub mod medium;
 pub mod microfacet;
 pub mod nested;
+pub mod observer;
 pub mod operator;
 pub mod params;
 pub mod phase;
@@ -28,7 +29,7 @@ pub mod tracking;
 pub mod vertex;
 
 pub use abi::{ParamDecl, PluginKind};
-pub use closure::Closure;
+pub use closure::{Closure, Either, Slot, Stored};
 pub use export::Plugin;
 pub use extent::Extent;
 pub use integrator::{Integrator, Output, SceneView, Stopped, Transport};

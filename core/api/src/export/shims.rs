@@ -3,7 +3,7 @@
 use super::Plugin;
 use super::instance::{closure_panicked, create, destroy, guarded, instance, panic_text};
 use crate::abi::*;
-use crate::closure::Closure;
+use crate::closure::{Closure, Slot};
 use crate::integrator::{Integrator, Output, SceneView};
 use crate::math::{Float3, Vec3};
 use crate::medium::{Medium, MediumInfo};
@@ -208,8 +208,6 @@ impl<T: Plugin + PhaseFunction> PhaseShim<T> {
 pub struct BsdfShim<T>(PhantomData<T>);
 
 impl<T: Plugin + Bsdf> BsdfShim<T> {
-    const SCATTER: &'static ScatterTable = &ScatterShim::<T::Closure>::TABLE;
-
     /// The table.
     pub const TABLE: BsdfTable = BsdfTable {
         size: size_of::<BsdfTable>() as u32,
@@ -248,8 +246,8 @@ impl<T: Plugin + Bsdf> BsdfShim<T> {
         // SAFETY: a live instance and valid pointers, by the ABI.
         let (i, at) = unsafe { (instance::<T>(p), &*at) };
         guarded(i.host, || {
-            // SAFETY: the table is the one made for this closure type; `out` is valid for writing.
-            unsafe { Closure::store(out, Self::SCATTER, i.value.closure(at)) };
+            // SAFETY: `out` is valid for writing.
+            i.value.store(at, unsafe { Slot::new(out) });
             Status::OK
         })
     }
