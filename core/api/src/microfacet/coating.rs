@@ -12,6 +12,8 @@ const COLOURS: u32 = 3;
 pub trait Coating: Copy + Send + Sync + 'static {
     /// A reflectance.
     type Value: Lanes;
+    /// There is none.
+    const IS_BARE: bool;
 
     /// Reflectance for light at cosine `cos` ≥ 0, `eta` being the index on the far side over that on the near one, and the cosine of
     /// the refracted direction (0 if reflection is total). `inside` tells whether the light comes from the side that is not coated.
@@ -33,6 +35,7 @@ pub struct Bare;
 
 impl Coating for Bare {
     type Value = f32;
+    const IS_BARE: bool = true;
 
     #[inline(always)]
     fn reflects(&self, cos: f32, eta: f32, _: bool) -> (f32, f32) {
@@ -57,6 +60,7 @@ impl Coating for Bare {
 
 impl Coating for Film {
     type Value = Spectrum;
+    const IS_BARE: bool = false;
 
     /// From within, what is not reflected totally meets the stack in the opposite order, which reflects as much (Born & Wolf, §1.6.3).
     #[inline]

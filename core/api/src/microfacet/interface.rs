@@ -4,8 +4,8 @@ use super::SMOOTH_BELOW;
 use super::coating::{Bare, Coating};
 use super::energy::Width;
 use super::exits::{self, Exits};
-use super::fresnel;
 use super::ggx::{Ggx, reflect};
+use super::{facets, fresnel};
 use crate::math::{Vec3, warp};
 use crate::operator::{Measure, ScatterDraws, ScatterEval, ScatterSample};
 use crate::spectrum::{Lanes, Spectrum};
@@ -83,6 +83,26 @@ impl Interface {
         out
     }
 
+    /// The boundary as it is under a coating, by which less or more light meets several facets, in the mean of all colours.
+    pub fn under<C: Coating>(mut self, coating: &C) -> Self {
+        if C::IS_BARE || self.smooth || self.thin {
+            return self;
+        }
+        let adds = average(|mu| added(coating, mu, self.eta, false));
+        let f = fresnel::dielectric_average(self.eta) + adds;
+        // 1 − F(1/η) = (1 − F(η))/η².
+        let back = 1.0 - (1.0 - f) / (self.eta * self.eta);
+        let lost = [(self.eta, false), (1.0 / self.eta, true)].map(|(eta, inside)| {
+            let more = |mu| {
+                let w = warp::around_z(mu, 0.125);
+                self.lost_under(coating, w, eta, inside) - self.lost(w, eta)
+            };
+            (1.0 - self.width.total_average(eta) + average(more)).max(1e-6)
+        });
+        self.share_out(f, back, lost);
+        self
+    }
+
     /// Shares of what meets more than one facet.
     fn share(&mut self) {
         let f = fresnel::dielectric_average(self.eta);
@@ -95,6 +115,11 @@ impl Interface {
         let back = fresnel::dielectric_average(1.0 / self.eta);
         let lost =
             [self.eta, 1.0 / self.eta].map(|eta| (1.0 - self.width.total_average(eta)).max(1e-6));
+        self.share_out(f, back, lost);
+    }
+
+    /// The same from the mean reflectances and the lost shares for diffuse light, from above and from below.
+    fn share_out(&mut self, f: f32, back: f32, lost: [f32; 2]) {
         let least = lost[0].min(lost[1]);
         self.norm = lost.map(|l| FRAC_1_PI / l);
         self.reflects = [
@@ -163,6 +188,23 @@ impl Interface {
         }
     }
 
+    /// [`lost`](Self::lost) under a coating: what it lets reflect in place of passing is masked otherwise.
+    #[inline(always)]
+    fn lost_under<C: Coating>(&self, coating: &C, w: Vec3, eta: f32, inside: bool) -> f32 {
+        let lost = self.lost(w, eta);
+        if C::IS_BARE || self.thin {
+            return lost;
+        }
+        let (mirrors, reflects) = (self.width.single(w), self.width.reflected(w, eta));
+        // What facets that reflect nothing would let pass, about.
+        let passes = (1.0 - lost - reflects) * mirrors / (mirrors - reflects).max(1e-3);
+        let mut adds = 0.0;
+        for (cos, weight) in facets::cosines(w.z, self.width.isotropic()) {
+            adds += weight * added(coating, cos, eta, inside);
+        }
+        (lost - adds * (mirrors - passes)).clamp(0.0, 0.99)
+    }
+
     #[inline(always)]
     fn turn(&self, wo: Vec3, wi: Vec3) -> Turned {
         if wo.z >= 0.0 {
@@ -187,7 +229,7 @@ impl Interface {
         self.eval_under(&Bare, wo, wi)
     }
 
-    /// [`eval`](Self::eval) under a coating. Light that meets several facets is not coloured by it.
+    /// [`eval`](Self::eval) under a coating, which [`under`](Self::under) was told of. Light that meets several facets is not coloured by it.
     #[inline]
     pub fn eval_under<C: Coating>(&self, coating: &C, wo: Vec3, wi: Vec3) -> ScatterEval {
         if self.smooth || wo.z.abs() < GRAZING || wi.z.abs() < GRAZING {
@@ -200,8 +242,9 @@ impl Interface {
             true => 1.0 / t.eta,
             false => t.eta,
         };
-        let lo = self.lost(t.wo, t.eta);
-        let li = self.lost(t.wi, eta_i);
+        let inside = self.inside(&t);
+        let lo = self.lost_under(coating, t.wo, t.eta, inside);
+        let li = self.lost_under(coating, t.wi, eta_i, inside != (crosses && !self.thin));
         let once = if crosses && !self.thin {
             self.refract_once(coating, &t)
         } else {
@@ -347,7 +390,7 @@ impl Interface {
         t: &Turned,
         u: ScatterDraws,
     ) -> Option<(Vec3, bool)> {
-        let lost = self.lost(t.wo, t.eta);
+        let lost = self.lost_under(coating, t.wo, t.eta, self.inside(t));
         if u.lobe < lost {
             let wi = warp::cosine_hemisphere(u.dir);
             let crosses = u.lobe >= lost * self.reflects[t.side];
@@ -366,6 +409,19 @@ impl Interface {
         let wi = h * (co / t.eta - cos) - t.wo / t.eta;
         Some((wi.try_normalize()?, true))
     }
+}
+
+/// What a coating adds to the reflectance of a facet, in the mean of all colours.
+#[inline(always)]
+fn added<C: Coating>(coating: &C, cos: f32, eta: f32, inside: bool) -> f32 {
+    C::mean(coating.reflects(cos, eta, inside).0) - fresnel::dielectric(cos, eta).0
+}
+
+/// Mean for diffuse light, 2 ∫ f(μ) μ dμ, of what is smooth.
+fn average(f: impl Fn(f32) -> f32) -> f32 {
+    const N: u32 = 12;
+    let at = |i: u32| ((i as f32 + 0.5) / N as f32).sqrt();
+    (0..N).map(|i| f(at(i)) / N as f32).sum()
 }
 
 /// Mirrored at the surface.

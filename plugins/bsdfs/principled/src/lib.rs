@@ -45,8 +45,8 @@
 //! **Energy.** What facets lose by shadowing each other is returned (Kulla & Conty 2017); the diffuse base gets exactly what
 //! the boundary above it lets through in both directions, and facets under coat or fuzz what both passages leave over the mean
 //! passage ([`resolvent_api::microfacet::exits`]), for what the layers send back down is reflected again: a white base, metal, glass
-//! or not, loses nothing, to 1 %. Everything is reciprocal. Over rough glass a film is left out of what
-//! meets several facets: one of index 2.1 loses 2 % at roughness 0.6, 8 % at 1. With anisotropic facets under
+//! or not, loses nothing, to 1 %. Everything is reciprocal. Under films it is 2 %, and on
+//! the roughest glass, where several facets know only the mean of the film's colours, 3 %. With anisotropic facets under
 //! a layer, or fuzz on a rough coat, it is 2 %. A coat with normals of its own is as shading normals are: its cosine is with them, walks
 //! from lights take the adjoint, and what it would reflect below the surface is lost.
 //!

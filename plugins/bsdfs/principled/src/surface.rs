@@ -110,6 +110,11 @@ impl<S: Skin> Surface<S> {
         let outer = p.specular_color.map(|c| c.min(1.0)) * p.specular;
         let body_widths = if is_rough { widths } else { [0.0; 2] };
         let body = Interface::new(body_widths, eta, p.thin);
+        let body = if transparent > 0.0 {
+            body.under(skin.coat())
+        } else {
+            body
+        };
         let mut layers = Layers::new(p, outside, transparent == 0.0 || p.thin, lanes);
         let facets = is_rough.then_some(widths);
         layers.over(facets, (transparent > 0.0).then_some(&body));

@@ -36,7 +36,7 @@ fn filmed_samples_follow_their_density() {
 }
 
 /// White furnace: what films keep from reflection passes, and the other way round. To 1.5 %, near grazing 2 %: over a diffuse base shares are
-/// known to 1 %. What meets several facets of glass does not know of the film, which on very rough glass loses light.
+/// known to 1 %. What meets several facets of glass knows of the film in the mean of all colours, which is 3 % off for single ones on the roughest.
 #[test]
 fn films_lose_nothing() {
     let mut suite = Suite::new();
@@ -50,8 +50,7 @@ fn films_lose_nothing() {
                     let what = format!("{params} at {wo}, lane {lane}");
                     let bound = match roughness {
                         _ if wo.z < 0.2 => 0.02,
-                        0.6 if white.contains("2.1") => 0.025,
-                        1.0 if white.contains("2.1") => 0.085,
+                        1.0 if white.contains("2.1") => 0.035,
                         _ => 0.015,
                     };
                     suite.close(&what, *a, 1.0, 0.0, bound);
