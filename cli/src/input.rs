@@ -1,5 +1,6 @@
-//! What kind of file the user gave.
+//! What kind of file the user gave, and which options go with it.
 
+use crate::args::Render;
 use crate::failure::{Outcome, input};
 use std::io::Read;
 use std::path::Path;
@@ -73,4 +74,26 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
             path.display()
         )))
     }
+}
+
+/// Refuses options that are for other inputs.
+pub fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
+    if let (Kind::Scene | Kind::Usd, Some(option)) = (kind, a.guesses.given()) {
+        let what = if kind == Kind::Usd {
+            "USD stage"
+        } else {
+            "scene"
+        };
+        return Err(input(format!(
+            "{option} is for VDB files and models; {} is a {what}, which says this itself",
+            a.input.display()
+        )));
+    }
+    if let (true, Some(option)) = (kind != Kind::Usd, a.stage.given()) {
+        return Err(input(format!(
+            "{option} is for USD stages; {} is none",
+            a.input.display()
+        )));
+    }
+    Ok(())
 }

@@ -36,7 +36,7 @@ pub fn run(a: &Render) -> Outcome {
         Message::Info(text) => console::info(text),
     });
     let kind = crate::input::kind(&a.input)?;
-    refuse(a, kind)?;
+    crate::input::refuse(a, kind)?;
     match &a.stage.frames {
         Some(frames) => sequence::run(a, frames, |a| one(a, kind)),
         None => one(a, kind),
@@ -183,28 +183,6 @@ fn named(a: &Render, kind: Kind, error: &resolvent_engine::Error) -> Failure {
         return input(format!("{path}: {text}"));
     }
     input(text)
-}
-
-/// Refuses options that are for other inputs.
-pub fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
-    if let (Kind::Scene | Kind::Usd, Some(option)) = (kind, a.guesses.given()) {
-        let what = if kind == Kind::Usd {
-            "USD stage"
-        } else {
-            "scene"
-        };
-        return Err(input(format!(
-            "{option} is for VDB files and models; {} is a {what}, which says this itself",
-            a.input.display()
-        )));
-    }
-    if let (true, Some(option)) = (kind != Kind::Usd, a.stage.given()) {
-        return Err(input(format!(
-            "{option} is for USD stages; {} is none",
-            a.input.display()
-        )));
-    }
-    Ok(())
 }
 
 /// The description of what to render.

@@ -37,7 +37,7 @@ pub fn run(a: &Render) -> Outcome {
     interrupt::install(On::Tell);
     // What no change of a file can mend ends it at once.
     let kind = crate::input::kind(&a.input)?;
-    crate::render::refuse(a, kind)?;
+    crate::input::refuse(a, kind)?;
     let targets = output::targets(&a.output, Some(&a.input))?;
     if let Some(file) = &a.stats {
         output::check_writable(file)?;

@@ -6,7 +6,6 @@
 mod instance;
 mod shims;
 
-pub(crate) use instance::{TaskPanic, panic_text};
 pub use shims::{BsdfShim, IntegratorShim, MediumShim, PhaseShim, ScatterShim};
 
 use crate::abi::{ABI_MAJOR, ABI_MINOR, MAGIC, ParamDecl, PluginHeader, PluginKind, Text};

@@ -19,6 +19,7 @@ pub mod microfacet;
 pub mod nested;
 pub mod observer;
 pub mod operator;
+mod panics;
 pub mod params;
 pub mod phase;
 pub mod rng;

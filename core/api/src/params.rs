@@ -334,7 +334,7 @@ impl Host {
             let shared = unsafe { &*data.cast::<Shared<F>>() };
             let call = std::panic::AssertUnwindSafe(|| (shared.task)(index));
             if let Err(payload) = std::panic::catch_unwind(call) {
-                let text = crate::export::panic_text(payload);
+                let text = crate::panics::panic_text(payload);
                 shared.lock().get_or_insert(text);
             }
         }
@@ -348,7 +348,7 @@ impl Host {
             (t.parallel_for)(t.ctx, count, run::<F> as Task, (&raw const shared).cast());
         }
         if let Some(text) = shared.lock().take() {
-            std::panic::resume_unwind(Box::new(crate::export::TaskPanic(text)));
+            std::panic::resume_unwind(Box::new(crate::panics::TaskPanic(text)));
         }
     }
 }

@@ -206,6 +206,21 @@ impl Sampler {
         self.draws(bounce, Purpose::Connection, prior)
     }
 
+    /// A transmittance beside those of the path; `purpose` tells them apart.
+    #[inline(always)]
+    pub fn unrelated(&self, purpose: u64) -> FlightDraws {
+        let key = if self.flights { self.key(purpose) } else { 0 };
+        FlightDraws {
+            key,
+            tau: unit((key >> 32) as u32),
+            event: unit(key as u32),
+            hero: self.hero,
+            lanes: self.lanes,
+            prior: Spectrum::ONE,
+            ..FlightDraws::default()
+        }
+    }
+
     #[inline(always)]
     fn draws(&self, bounce: u32, purpose: Purpose, prior: Spectrum) -> FlightDraws {
         if !self.flights {

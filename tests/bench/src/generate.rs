@@ -40,6 +40,12 @@ pub fn scene(resolution: [u32; 2], origin: [f64; 3], target: [f64; 3], fov: f64)
     })
 }
 
+/// Reads a scene.
+pub fn read(path: &Path) -> Result<Value> {
+    let text = std::fs::read(path).map_err(Error::io(path))?;
+    serde_json::from_slice(&text).map_err(|e| Error::invalid(format!("{}: {e}", path.display())))
+}
+
 /// Writes a scene.
 pub fn write(scene: &Value, path: &Path) -> Result<()> {
     std::fs::write(path, scene.to_string()).map_err(Error::io(path))

@@ -34,7 +34,7 @@ use renderer::Renderer;
 use results::{Results, machine, today};
 use session::Plan;
 use std::path::{Path, PathBuf};
-use suite::{CASES, Suite};
+use suite::{CASES, Converged, Suite};
 
 /// A folder for what is only needed while the command runs.
 struct Work(PathBuf);
@@ -82,6 +82,10 @@ pub fn run(options: &Options) -> Result<bool> {
     }
     if options.make_references {
         for case in cases {
+            if case.converged != Converged::Stored {
+                println!("{}: needs no picture of its own", case.name);
+                continue;
+            }
             let made = if options.from.is_empty() {
                 let (i, t) = (&options.reference_integrator, options.reference_seconds);
                 reference::render(&suite, case, i, t, options.seed, &work.0)?

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::fit::{Point, PowerLaw};
+use crate::generate;
 use crate::renderer::{Failure, Job, Renderer};
 use crate::results::{Fit, Line, Run, SceneResult};
 use crate::score::{Picture, score};
@@ -69,7 +70,7 @@ pub fn measure(
     work: &Path,
     say: &dyn Fn(&str),
 ) -> Result<SceneResult> {
-    if case.converged == Converged::Stored && !suite.reference_path(case).is_file() {
+    if !matches!(case.converged, Converged::Constant(_)) && !suite.reference_path(case).is_file() {
         let why = "there is no reference yet: `resolvent bench --make-references` makes it";
         say(&format!("{}: not done: {why}", case.name));
         return Ok(SceneResult {
@@ -164,6 +165,9 @@ impl Bench<'_> {
     /// Samples per pixel of each level, from pilots that find the cost of a sample.
     fn levels(&self, r: &Renderer) -> std::result::Result<Vec<u64>, Failure> {
         let own = matches!(r, Renderer::Own { .. });
+        if let (false, Converged::Of(name)) = (own, self.case.converged) {
+            return Err(Failure::Unsupported(format!("the same there as {name}")));
+        }
         let least = if own { 2 * BATCH } else { 1 };
         let mut spp = if own { 2 * BATCH } else { 4 };
         let mut last: Option<(u64, f64)> = None;
@@ -280,9 +284,7 @@ pub fn fit(runs: &[Run]) -> Option<Fit> {
 
 /// Writes the volumes that a scene names as dense arrays, for peers.
 fn dense_volumes(scene: &Path, work: &Path) -> Result<()> {
-    let text = std::fs::read(scene).map_err(Error::io(scene))?;
-    let value: serde_json::Value = serde_json::from_slice(&text)
-        .map_err(|e| Error::invalid(format!("{}: {e}", scene.display())))?;
+    let value = generate::read(scene)?;
     let base = scene.parent().unwrap_or(Path::new("."));
     for (name, medium) in value["media"].as_object().into_iter().flatten() {
         if let Some(file) = medium["params"]["file"].as_str() {
@@ -297,9 +299,11 @@ fn dense_volumes(scene: &Path, work: &Path) -> Result<()> {
 fn reference_maker(suite: &Suite, case: &Case) -> String {
     match case.converged {
         Converged::Constant(v) => format!("exactly {v}"),
-        Converged::Stored => resolvent_image::Image::read_exr(suite.reference_path(case))
-            .ok()
-            .and_then(|i| i.metadata.get("by").cloned())
-            .unwrap_or_else(|| "unknown".into()),
+        Converged::Stored | Converged::Of(_) => {
+            resolvent_image::Image::read_exr(suite.reference_path(case))
+                .ok()
+                .and_then(|i| i.metadata.get("by").cloned())
+                .unwrap_or_else(|| "unknown".into())
+        }
     }
 }

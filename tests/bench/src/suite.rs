@@ -38,6 +38,8 @@ pub enum Source {
     Puffs,
     /// A thousand point lights.
     Lights,
+    /// The scene whose converged picture this has, by `pt` with shared paths.
+    Reuse,
 }
 
 /// What the converged picture is.
@@ -45,6 +47,8 @@ pub enum Source {
 pub enum Converged {
     /// `tests/bench/references/NAME.exr`.
     Stored,
+    /// That of another case, of which this is another rendering.
+    Of(&'static str),
     /// The same in every pixel.
     Constant(f64),
 }
@@ -64,6 +68,16 @@ pub struct Case {
     pub mode: Mode,
 }
 
+impl Case {
+    /// The case that has the same converged picture.
+    fn picture(&self) -> &'static str {
+        match self.converged {
+            Converged::Of(name) => name,
+            _ => self.name,
+        }
+    }
+}
+
 const fn case(name: &'static str, mode: Mode, purpose: &'static str) -> Case {
     Case {
         name,
@@ -71,6 +85,14 @@ const fn case(name: &'static str, mode: Mode, purpose: &'static str) -> Case {
         source: Source::File,
         converged: Converged::Stored,
         mode,
+    }
+}
+
+const fn reuse(name: &'static str, of: &'static str, purpose: &'static str) -> Case {
+    Case {
+        source: Source::Reuse,
+        converged: Converged::Of(of),
+        ..case(name, Mode::Quick, purpose)
     }
 }
 
@@ -129,10 +151,20 @@ pub const CASES: &[Case] = &[
         Mode::Quick,
         "Thin fog in a box with an area light: surfaces and a medium share the light.",
     ),
+    reuse(
+        "fog_reuse",
+        "box_fog",
+        "The same by `pt` with `reuse` 4: blocks of pixels share what their paths find.",
+    ),
     case(
         "surface_only",
         Mode::Smoke,
         "The same box without any medium: what surfaces alone cost.",
+    ),
+    reuse(
+        "surface_reuse",
+        "surface_only",
+        "The same by `pt` with `reuse` 4: blocks of pixels share what their paths find.",
     ),
     Case {
         source: Source::Lights,
@@ -232,6 +264,13 @@ impl Suite {
             Source::Big => generate::ball(BIG, 20.0, MADE, &work.join("big.vdb"))?,
             Source::Puffs => generate::puffs(1000, 0.18, [96, 72]),
             Source::Lights => generate::lights(1000, MADE),
+            Source::Reuse => {
+                let plain = self.root.join("scenes/bench");
+                let plain = plain.join(format!("{}.json", case.picture()));
+                let mut scene = generate::read(&plain)?;
+                scene["integrator"]["params"]["reuse"] = 4.into();
+                scene
+            }
         };
         generate::write(&scene, &path)?;
         Ok(path)
@@ -241,7 +280,7 @@ impl Suite {
     pub fn reference_path(&self, case: &Case) -> PathBuf {
         self.root
             .join("tests/bench/references")
-            .join(format!("{}.exr", case.name))
+            .join(format!("{}.exr", case.picture()))
     }
 
     /// The converged picture at a scene's resolution divided by `coarser`.
@@ -252,7 +291,7 @@ impl Suite {
                 color: vec![[v; 3]; size[0] * size[1]],
                 variance: None,
             },
-            Converged::Stored => Picture::read(&self.reference_path(case))?,
+            Converged::Stored | Converged::Of(_) => Picture::read(&self.reference_path(case))?,
         };
         if full.size != size {
             return Err(Error::invalid(format!(
@@ -274,9 +313,7 @@ impl Suite {
 
 /// Width and height that a scene asks for.
 pub fn resolution(scene: &Path) -> Result<[usize; 2]> {
-    let text = std::fs::read(scene).map_err(Error::io(scene))?;
-    let value: serde_json::Value = serde_json::from_slice(&text)
-        .map_err(|e| Error::invalid(format!("{}: {e}", scene.display())))?;
+    let value = generate::read(scene)?;
     let side = |k: usize| value["film"]["resolution"][k].as_u64().map(|v| v as usize);
     match (side(0), side(1)) {
         (Some(w), Some(h)) => Ok([w, h]),

@@ -6,7 +6,7 @@ use resolvent_engine::film::Errors;
 use resolvent_engine::plugin::{ForeignIntegrator, Registry};
 use resolvent_engine::scene::Scene;
 use resolvent_engine::{Goal, Rendered, Settings, render};
-use resolvent_scene::Filter;
+use resolvent_scene::{Filter, PluginBlock};
 use resolvent_tests::Moments;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -24,14 +24,14 @@ struct Shot {
 }
 
 impl Shot {
-    fn new(name: &str, integrator: &str, size: [u32; 2]) -> Self {
+    fn new(name: &str, integrator: PluginBlock, size: [u32; 2]) -> Self {
         let file = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("../scenes")
             .join(name);
         let mut described = resolvent_scene::Scene::read(file).unwrap_or_else(|e| panic!("{e}"));
         described.film.resolution = size;
         described.film.filter = Filter::Box { radius: 0.5 };
-        described.integrator = resolvent_scene::PluginBlock::new(integrator);
+        described.integrator = integrator;
         let registry = Registry::new(&[]);
         let scene = Scene::build(&described, &registry).unwrap_or_else(|e| panic!("{e}"));
         let kind = PluginKind::Integrator;
@@ -155,11 +155,11 @@ fn calibrate(shot: &Shot, seeds: u64, samples: u32) -> Calibration {
 
 /// What 200 renders say of their errors is true on average, with light tails and heavy ones, and 95 % intervals of pixels and of
 /// pictures' means cover the truth 93 to 97 % of the time.
-fn covers_the_truth(name: &str, integrator: &str, size: [u32; 2], samples: u32) {
+fn covers_the_truth(name: &str, integrator: PluginBlock, size: [u32; 2], samples: u32) {
     let shot = Shot::new(name, integrator, size);
     let samples = samples * if full() { 4 } else { 1 };
     let c = calibrate(&shot, 200, samples);
-    println!("{name} {integrator} {samples}: {c:?}");
+    println!("{name} {samples}: {c:?}");
     assert!((0.93..0.97).contains(&c.pixels), "{name}: {c:?}");
     // Of 200 pictures 1.5 % is the standard error of a share of 95 %.
     assert!((0.915..0.985).contains(&c.means), "{name}: {c:?}");
@@ -172,29 +172,51 @@ fn covers_the_truth(name: &str, integrator: &str, size: [u32; 2], samples: u32) 
 #[test]
 fn intervals_cover_the_truth_on_surfaces() {
     // 64 samples are four nets of 16, 256 ten of two sizes.
-    covers_the_truth("bench/surface_only.json", "pt", [12, 8], 64);
-    covers_the_truth("bench/surface_only.json", "pt", [8, 6], 256);
+    covers_the_truth(
+        "bench/surface_only.json",
+        PluginBlock::new("pt"),
+        [12, 8],
+        64,
+    );
+    covers_the_truth(
+        "bench/surface_only.json",
+        PluginBlock::new("pt"),
+        [8, 6],
+        256,
+    );
+}
+
+/// Where blocks of pixels share their paths, errors are alike around a pixel, whose variance is taken from there.
+#[test]
+fn intervals_cover_the_truth_where_paths_are_shared() {
+    let pt = PluginBlock::new("pt").with("reuse", 4.0);
+    covers_the_truth("bench/surface_only.json", pt, [12, 8], 64);
 }
 
 #[test]
 fn intervals_cover_the_truth_in_fog() {
-    covers_the_truth("bench/box_fog.json", "pt", [12, 8], 64);
+    covers_the_truth("bench/box_fog.json", PluginBlock::new("pt"), [12, 8], 64);
 }
 
 #[test]
 fn intervals_cover_the_truth_in_a_cloud() {
-    covers_the_truth("bench/cloud_sun.json", "pt", [12, 8], 64);
+    covers_the_truth("bench/cloud_sun.json", PluginBlock::new("pt"), [12, 8], 64);
 }
 
 #[test]
 fn intervals_cover_the_truth_from_both_ends() {
-    covers_the_truth("lampshade/lampshade.json", "bdpt", [8, 6], 64);
+    covers_the_truth(
+        "lampshade/lampshade.json",
+        PluginBlock::new("bdpt"),
+        [8, 6],
+        64,
+    );
 }
 
 /// Caustics found by chance: fewer pixels are covered, and the picture says so.
 #[test]
 fn heavy_tails_are_told() {
-    let shot = Shot::new("caustic/caustic.json", "pt", [16, 16]);
+    let shot = Shot::new("caustic/caustic.json", PluginBlock::new("pt"), [16, 16]);
     let c = calibrate(&shot, 24, 64);
     println!("{c:?}");
     assert!(c.pixels < 0.93 && c.doubtful > 0.9, "{c:?}");
@@ -203,7 +225,7 @@ fn heavy_tails_are_told() {
 /// Adaptive renders have the mean of uniform ones, tile by tile.
 #[test]
 fn adaptive_means_are_not_biased() {
-    let shot = Shot::new("bench/cloud_sun.json", "pt", [20, 12]);
+    let shot = Shot::new("bench/cloud_sun.json", PluginBlock::new("pt"), [20, 12]);
     let seeds: u64 = if full() { 200 } else { 12 };
     let goal = 0.3;
     let mean = |r: &Rendered| -> f64 {
@@ -262,7 +284,7 @@ fn adaptive_sampling_pays() {
     } else {
         ([48, 32], 4, 0.12, 1.1)
     };
-    let shot = Shot::new("bench/cloud_sun.json", "pt", size);
+    let shot = Shot::new("bench/cloud_sun.json", PluginBlock::new("pt"), size);
     let many = |first: u64, samples: u32, goal: Goal| -> Vec<Rendered> {
         let seeds = (first..first + seeds).into_par_iter();
         seeds.map(|s| shot.render(s, samples, goal)).collect()

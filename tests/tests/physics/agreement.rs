@@ -31,7 +31,7 @@ struct Case {
 }
 
 /// A room 2 × 2 × 2, open towards the camera, with a lamp below its ceiling.
-fn room(lamp: bool) -> Value {
+pub fn room(lamp: bool) -> Value {
     let mut s = scenes::scene([0.0; 3], [0.0, 1.0, 0.0]);
     s["camera"] = scenes::camera([0.0, -3.6, 0.0], [0.0, 1.0, 0.0], 39.0);
     s["film"]["resolution"] = json!([EDGE, EDGE]);
@@ -59,13 +59,13 @@ fn room(lamp: bool) -> Value {
     s
 }
 
-fn wall(s: &mut Value, corner: [f64; 3], u: [i32; 3], v: [i32; 3], material: &str) {
+pub fn wall(s: &mut Value, corner: [f64; 3], u: [i32; 3], v: [i32; 3], material: &str) {
     let shape = json!({ "type": "rectangle", "corner": corner, "edge_u": u, "edge_v": v,
                         "material": material });
     scenes::add(s, "shapes", shape);
 }
 
-fn ball(s: &mut Value, center: [f64; 3], radius: f64, material: &str, interior: Option<&str>) {
+pub fn ball(s: &mut Value, center: [f64; 3], radius: f64, material: &str, interior: Option<&str>) {
     let mut shape =
         json!({ "type": "sphere", "center": center, "radius": radius, "material": material });
     if let Some(interior) = interior {
@@ -74,13 +74,13 @@ fn ball(s: &mut Value, center: [f64; 3], radius: f64, material: &str, interior: 
     scenes::add(s, "shapes", shape);
 }
 
-fn fog(s: &mut Value, sigma_t: Value, albedo: Value, g: f64) {
+pub fn fog(s: &mut Value, sigma_t: Value, albedo: Value, g: f64) {
     let params = json!({ "sigma_t": sigma_t, "albedo": albedo, "phase": scenes::hg(g),
                          "bounds": [-0.999, -0.999, -0.999, 0.999, 0.999, 0.98] });
     scenes::medium(s, "fog", params);
 }
 
-fn cloud(s: &mut Value, name: &str, params: Value) {
+pub fn cloud(s: &mut Value, name: &str, params: Value) {
     let mut all = json!({ "kind": "cloud", "bounds": [-0.8, -0.8, -0.8, 0.8, 0.8, 0.6] });
     for (k, v) in params.as_object().into_iter().flatten() {
         all[k] = v.clone();
@@ -88,11 +88,11 @@ fn cloud(s: &mut Value, name: &str, params: Value) {
     s["media"][name] = json!({ "plugin": "procedural", "params": all });
 }
 
-fn bsdf(s: &mut Value, name: &str, plugin: &str, params: Value) {
+pub fn bsdf(s: &mut Value, name: &str, plugin: &str, params: Value) {
     s["materials"][name] = json!({ "plugin": plugin, "params": params });
 }
 
-fn outdoors() -> Value {
+pub fn outdoors() -> Value {
     let mut s = scenes::scene([0.0; 3], [0.0, 1.0, 0.0]);
     s["camera"] = scenes::camera([0.0, -3.6, 0.3], [0.0, 1.0, -0.1], 45.0);
     s["film"]["resolution"] = json!([EDGE, EDGE]);
@@ -297,18 +297,27 @@ fn cases() -> Vec<Case> {
     all
 }
 
-/// Means of the regions of pictures, lane by lane: of all light, and of each layer by scattering order.
-fn regions(scene: &Value, integrator: &Value, spp: u32) -> Vec<Moments> {
+/// Means of the regions of pictures with seeds from `first` on, lane by lane: of all light, and of each of `layers` layers by scattering
+/// order, 0 or at least 2.
+pub fn regions(
+    scene: &Value,
+    integrator: &Value,
+    spp: u32,
+    layers: usize,
+    first: u64,
+) -> Vec<Moments> {
     let mut s = scene.clone();
     s["integrator"] = integrator.clone();
-    s["film"]["aovs"] = json!([format!("orders:{}", LAYERS - 2)]);
+    if layers > 0 {
+        s["film"]["aovs"] = json!([format!("orders:{}", layers - 2)]);
+    }
     let ready = harness::build(&s).unwrap_or_else(|e| panic!("{e}"));
     let across = EDGE / REGION;
     let one = (across * across * 3) as usize;
-    let mut out = vec![Moments::default(); one * (1 + LAYERS)];
+    let mut out = vec![Moments::default(); one * (1 + layers)];
     let seeds = if harness::full() { 4 * SEEDS } else { SEEDS };
     for seed in 0..seeds {
-        let film = ready.render(1000 + seed, 0, spp).film;
+        let film = ready.render(first + seed, 0, spp).film;
         for (k, m) in out.iter_mut().enumerate() {
             let (layer, region, lane) = (k / one, (k % one) as u32 / 3, k % 3);
             let (x0, y0) = (region % across * REGION, region / across * REGION);
@@ -352,7 +361,7 @@ fn integrators_agree() {
             continue;
         }
         let spp = if cfg!(debug_assertions) { 16 } else { case.spp };
-        let reference = regions(&case.scene, &json!({ "plugin": "pt" }), spp);
+        let reference = regions(&case.scene, &json!({ "plugin": "pt" }), spp, LAYERS, 1000);
         let one = reference.len() / (1 + LAYERS);
         let mut line = format!("agreement: {}", case.name);
         for (integrator, factor) in [("bdpt", 1), (DEPTH, 1), ("mlt", 1), ("light", 3)] {
@@ -372,7 +381,7 @@ fn integrators_agree() {
                 }
                 plugin["params"] = json!({ "media_weights": "depth" });
             }
-            let found = regions(&case.scene, &plugin, spp * factor);
+            let found = regions(&case.scene, &plugin, spp * factor, LAYERS, 1000);
             let mut least = (1.0f64, 0);
             for (k, (a, b)) in found.iter().zip(&reference).enumerate() {
                 let p = welch(a, b);

@@ -22,6 +22,7 @@ mod nested;
 mod orders;
 mod peers;
 mod points;
+mod reuse;
 mod slab_flux;
 mod slab_radiance;
 mod soak;

@@ -1,13 +1,14 @@
 //! The tables of the kinds: functions of C that call the safe traits.
 
 use super::Plugin;
-use super::instance::{closure_panicked, create, destroy, guarded, instance, panic_text};
+use super::instance::{closure_panicked, create, destroy, guarded, instance};
 use crate::abi::*;
 use crate::closure::{Closure, Slot};
 use crate::integrator::{Integrator, Output, SceneView};
 use crate::math::{Float3, Vec3};
 use crate::medium::{Medium, MediumInfo};
 use crate::operator::*;
+use crate::panics::panic_text;
 use crate::params::Host;
 use crate::phase::{MediumPoint, PhaseFunction};
 use crate::spectrum::Spectrum;

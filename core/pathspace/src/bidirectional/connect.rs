@@ -457,7 +457,7 @@ fn reverse_at(e: &ScatterEval, v: &Vertex, before: &Vertex) -> f64 {
 }
 
 /// A vertex as the end of a connection that comes along `w`.
-pub(super) fn target(v: &Vertex, w: Vec3, distance: f32) -> LightSample {
+pub fn target(v: &Vertex, w: Vec3, distance: f32) -> LightSample {
     let surface = v.is(VertexKind::Surface);
     LightSample {
         wi: w.into(),

@@ -12,7 +12,7 @@ pub mod path;
 mod subpath;
 pub mod verify;
 
-pub use connect::{Bidirectional, Splat};
+pub use connect::{Bidirectional, Splat, target};
 pub use draws::{Draws, End, NetDraws};
 pub use every::{Found, Pairs};
 pub use subpath::{Node, Subpath};

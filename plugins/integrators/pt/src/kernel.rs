@@ -36,29 +36,47 @@ pub struct Kernel<'a> {
 
 /// How the direction to the next vertex was found, for the weight of light met there.
 #[derive(Clone, Copy)]
-enum Found {
+pub enum Found {
     /// By the camera or a delta lobe: no connection could have found it.
     Alone,
     /// By scattering with this density per steradian.
     With(f32),
+    /// Whichever way: its light is counted already.
+    Counted,
 }
 
 /// The state of a walk between two vertices.
 #[derive(Clone, Copy)]
-struct Walk {
+pub struct Walk {
     /// Contribution and density.
-    beta: Throughput,
+    pub beta: Throughput,
     /// S: density of the ways through branches, relative to the walk's.
-    others: f32,
+    pub others: f32,
     /// How the current direction was found.
-    found: Found,
+    pub found: Found,
     /// Scattering events so far.
-    depth: u32,
+    pub depth: u32,
     /// What the numbers of the next vertex share with those before.
-    shared: [f32; 2],
+    pub shared: [f32; 2],
     /// Density of the current direction around the sun relative to isotropic, at least 1: what the light still to come
     /// is expected to be worth.
-    promise: f32,
+    pub promise: f32,
+}
+
+impl Walk {
+    /// A walk that leaves the camera with this weight.
+    pub fn new(weight: f32, sampler: &Sampler) -> Self {
+        let mut beta = Throughput::ONE;
+        beta.f *= weight;
+        Self {
+            beta,
+            others: 0.0,
+            found: Found::Alone,
+            depth: 0,
+            shared: sampler.first_point(),
+            promise: 1.0,
+        }
+    }
 }
 
 impl Kernel<'_> {
@@ -76,15 +94,7 @@ impl Kernel<'_> {
         let Some(ray) = self.scene.camera_ray(pixel, film, lens)? else {
             return Ok(out);
         };
-        let mut walk = Walk {
-            beta: Throughput::ONE,
-            others: 0.0,
-            found: Found::Alone,
-            depth: 0,
-            shared: sampler.first_point(),
-            promise: 1.0,
-        };
-        walk.beta.f *= ray.weight;
+        let walk = Walk::new(ray.weight, sampler);
         let (mut first, mut second) = (Vertex::empty(), Vertex::empty());
         // Vertices are large: they change roles, not places.
         let (here, next) = (&mut first, &mut second);
@@ -103,7 +113,7 @@ impl Kernel<'_> {
 
     /// Follows a walk from the edge it is on to its end; the light it finds.
     #[allow(clippy::too_many_arguments)]
-    fn follow<'v, const CHROMATIC: bool, const BRANCHES: bool, T: Tally>(
+    pub fn follow<'v, const CHROMATIC: bool, const BRANCHES: bool, T: Tally>(
         &self,
         mut walk: Walk,
         sampler: &Sampler,
@@ -129,7 +139,10 @@ impl Kernel<'_> {
                 break;
             }
             let medium = next.is(VertexKind::Medium);
-            if !medium && next.flags & vertex_flags::EMITS != 0 {
+            if !medium
+                && next.flags & vertex_flags::EMITS != 0
+                && !matches!(walk.found, Found::Counted)
+            {
                 let other = match walk.found {
                     Found::With(density) if self.connects => {
                         scene.light_density(here, next) / density
@@ -192,7 +205,7 @@ impl Kernel<'_> {
     /// Accounts for a new direction `wi`, chosen with density `q` at `here`: its share of the ways through branches, and
     /// what it promises.
     #[inline(always)]
-    fn turn(
+    pub fn turn(
         &self,
         walk: &mut Walk,
         here: &Vertex,
@@ -258,7 +271,7 @@ impl Kernel<'_> {
 
     /// Light that reaches `here` straight from a light chosen at random.
     #[inline(always)]
-    fn connect<const CHROMATIC: bool>(
+    pub fn connect<const CHROMATIC: bool>(
         &self,
         here: &Vertex,
         walk: &Walk,

@@ -8,6 +8,7 @@
 //! |---|---|---|---|
 //! | `max_depth` | int ≥ −1 | −1 | scattering events after which a path ends, −1: none. A limit makes the picture darker than it should be |
 //! | `sample_lights` | bool | true | connect vertices to lights. Without, light is only met by scattering: cheaper where lights fill much of the view, as the sky does round a thick cloud, and blind to point and sun lights |
+//! | `reuse` | int 1…8 | 1 | edge, in pixels, of the blocks whose paths share all that they find beyond their second vertices, 1: none. Not where media tell lanes apart, nor for layers by scattering order |
 //! | `branching` | float 0…1 | 0.25 | probability of a branch towards the sun at a vertex in a medium; the picture's mean does not depend on it |
 //!
 //! ```json
@@ -15,6 +16,7 @@
 //! ```
 
 mod kernel;
+mod reuse;
 
 use kernel::Kernel;
 use resolvent_api::abi::{ParamDecl, Tile, scene_traits};
@@ -28,6 +30,7 @@ use resolvent_pathspace::samples;
 struct PathTracer {
     max_depth: u32,
     sample_lights: bool,
+    reuse: u32,
     branching: f32,
 }
 
@@ -48,6 +51,14 @@ impl Plugin for PathTracer {
         )
         .default("true")
         .build(),
+        Decl::int(
+            "reuse",
+            "edge, in pixels, of the blocks whose paths share what they find beyond their second vertices (where media are grey); 1: none",
+        )
+        .default("1")
+        .at_least(1.0)
+        .at_most(8.0)
+        .build(),
         Decl::float(
             "branching",
             "probability of a branch towards the sun at a vertex in a medium; 0: never",
@@ -62,6 +73,7 @@ impl Plugin for PathTracer {
         Ok(Self {
             max_depth: u32::try_from(params.int("max_depth")?).unwrap_or(u32::MAX),
             sample_lights: params.bool("sample_lights")?,
+            reuse: params.int("reuse")? as u32,
             branching: params.float("branching")? as f32,
         })
     }
@@ -79,6 +91,9 @@ impl Integrator for PathTracer {
             sun,
             branching: self.branching,
         };
+        if self.reuse > 1 && out.orders() == 0 && scene.is_grey() {
+            return reuse::render(&kernel, self.reuse, tile, out);
+        }
         // The facts about the scene choose the kernel once a tile; lanes cost nothing where no medium tells them apart.
         match (scene.is_grey(), out.orders()) {
             (true, 0) => tile_of::<false, _>(&kernel, tile, out, Together),
