@@ -8,7 +8,7 @@
 //!
 //! The last line is Poisson's kernel. A lane that sees wavelengths with the sensitivity s sees e^{imδ} as ŝ(mD), s's Fourier transform:
 //! the idea of Belcour & Barla 2017, "A Practical Extension to Microfacet Theory for the Modeling of Varying Iridescence", with
-//! transforms of the sensitivities themselves in place of Gaussians ([`response`]).
+//! transforms of the sensitivities themselves in place of Gaussians.
 //!
 //! What lies below is known by the reflectance it has without the film, R₁₃, which may be any curve that an artist likes, and the phase that its
 //! index gives it: r₂₃ = (r₁₃ − r₁₂)/(1 − r₁₂ r₁₃) is what a film of no thickness would need for that. So whatever the curve, the
