@@ -23,6 +23,7 @@ mod panics;
 pub mod params;
 pub mod phase;
 pub mod rng;
+pub mod slot;
 pub mod spectrum;
 pub mod surface;
 pub mod texture;
@@ -30,7 +31,7 @@ pub mod tracking;
 pub mod vertex;
 
 pub use abi::{ParamDecl, PluginKind};
-pub use closure::{Closure, Either, Slot, Stored};
+pub use closure::Closure;
 pub use export::Plugin;
 pub use extent::Extent;
 pub use integrator::{Integrator, Output, SceneView, Stopped, Transport};
@@ -43,6 +44,7 @@ pub use operator::{
 };
 pub use params::{Decl, Error, Params};
 pub use phase::PhaseFunction;
+pub use slot::{Either, Slot, Stored};
 pub use spectrum::{Lanes, Spectrum};
 pub use surface::{Bsdf, SurfacePoint};
 pub use texture::{Textured, TexturedFloat, TexturedSpectrum};

@@ -1,8 +1,8 @@
 //! Surfaces: the trait of BSDF plugins.
 
-use crate::closure::{Slot, Stored};
 use crate::math::{Float3, Frame, Vec3};
 use crate::operator::Scatter;
+use crate::slot::{Slot, Stored};
 use bytemuck::{Pod, Zeroable};
 
 /// A point on a surface, as a BSDF sees it.

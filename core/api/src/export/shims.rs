@@ -3,7 +3,7 @@
 use super::Plugin;
 use super::instance::{closure_panicked, create, destroy, guarded, instance};
 use crate::abi::*;
-use crate::closure::{Closure, Slot};
+use crate::closure::Closure;
 use crate::integrator::{Integrator, Output, SceneView};
 use crate::math::{Float3, Vec3};
 use crate::medium::{Medium, MediumInfo};
@@ -11,6 +11,7 @@ use crate::operator::*;
 use crate::panics::panic_text;
 use crate::params::Host;
 use crate::phase::{MediumPoint, PhaseFunction};
+use crate::slot::Slot;
 use crate::spectrum::Spectrum;
 use crate::surface::{Bsdf, SurfacePoint};
 use core::ffi::c_void;
