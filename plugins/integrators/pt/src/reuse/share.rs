@@ -13,9 +13,9 @@ use resolvent_pathspace::sampler::Sampler;
 use resolvent_pathspace::{roulette, scatter};
 
 /// Chains of null collisions by which ρ is estimated in media where it is random: their mean. A flight's own is one of them, any of
-/// them alike, so that weights stay exact. On `bench/cloud_sun` at 2048 × 1536 pixels, the squared error times CPU time is 0.87 of
-/// that of one chain with two, 0.82 with four, and more again with eight.
-const CHAINS: u64 = 4;
+/// them alike, so that weights stay exact. On `bench/cloud_sun` at 2048 × 1536 pixels, the squared error times CPU time with two is
+/// 0.87 of that with one, with four 0.82; but in thin smoke, where sharing gains nothing, four cost twice what two do.
+const CHAINS: u64 = 2;
 
 /// How first vertex `member` sees a second vertex: K at both and the geometry term between them, for the light chosen there and
 /// for the direction chosen there.
