@@ -101,6 +101,10 @@ pub struct Render {
     /// Integrator plugin, by name or path
     #[arg(long, value_name = "NAME", help_heading = "Sampling")]
     pub integrator: Option<String>,
+    /// Let blocks of N x N pixels share their paths (integrator pt): less noise in dense clouds at large sizes and in rooms, but
+    /// noise that neighbours have in common
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8), help_heading = "Sampling")]
+    pub reuse: Option<u8>,
 
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", help_heading = "Picture")]

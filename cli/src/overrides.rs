@@ -59,6 +59,16 @@ pub fn apply(a: &Render, scene: &mut Scene) -> Outcome<Plan> {
         }
         scene.integrator = block;
     }
+    if let Some(edge) = a.reuse {
+        let block = std::mem::take(&mut scene.integrator);
+        if block.plugin != "pt" {
+            return Err(input(format!(
+                "--reuse is for the integrator pt; this is {}",
+                block.plugin
+            )));
+        }
+        scene.integrator = block.with("reuse", f64::from(edge));
+    }
     if let Some(n) = a.spp {
         scene.sampling.budget = Budget::Spp(n);
     } else if let Some(t) = a.time {

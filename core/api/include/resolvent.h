@@ -1,7 +1,7 @@
 #ifndef RESOLVENT_H
 #define RESOLVENT_H
 
-/* The plugin ABI of Resolvent, version 1.3, for plugins in C and C++.
+/* The plugin ABI of Resolvent, version 1.4, for plugins in C and C++.
  *
  * A plugin is a shared library that exports one object, `resolvent_plugin`, a `resolvent_header` whose `table` holds the functions of
  * its kind:
@@ -83,7 +83,7 @@ typedef struct resolvent_spectrum {
 #define RESOLVENT_ABI_MAJOR 1
 
 /* The host accepts plugins of any minor version; it reads only what a table's size says is there. */
-#define RESOLVENT_ABI_MINOR 3
+#define RESOLVENT_ABI_MINOR 4
 
 /* Table is a `resolvent_medium_table`. */
 #define RESOLVENT_PLUGIN_KIND_MEDIUM 1
@@ -171,6 +171,9 @@ typedef struct resolvent_spectrum {
 
 /* Has an environment. */
 #define RESOLVENT_SCENE_TRAITS_ENVIRONMENT 64
+
+/* Some medium's transmittances are random estimates, not in closed form. Since minor version 4. */
+#define RESOLVENT_SCENE_TRAITS_TRACKED_MEDIA 128
 
 /* Bytes a closure may occupy. Only those in use are ever written or copied by the SDK, so a small closure doesn't pay for a
  * large one; the bound leaves room for two closures of 216 bytes nested in a third (`nested`). */

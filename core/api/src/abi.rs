@@ -38,7 +38,7 @@ pub const MAGIC: [u8; 8] = *b"RESOLVNT";
 /// Versions must agree exactly.
 pub const ABI_MAJOR: u32 = 1;
 /// The host accepts plugins of any minor version; it reads only what a table's size says is there.
-pub const ABI_MINOR: u32 = 3;
+pub const ABI_MINOR: u32 = 4;
 /// Name of the exported `static` [`PluginHeader`].
 pub const SYMBOL: &str = "resolvent_plugin";
 

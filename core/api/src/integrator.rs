@@ -61,8 +61,10 @@ impl<'a> SceneView<'a> {
     /// True if the scene has all of these [`scene_traits`].
     #[inline(always)]
     pub fn has(&self, traits: u32) -> bool {
-        let media =
-            scene_traits::MEDIA | scene_traits::EMISSIVE_MEDIA | scene_traits::CHROMATIC_MEDIA;
+        let media = scene_traits::MEDIA
+            | scene_traits::EMISSIVE_MEDIA
+            | scene_traits::CHROMATIC_MEDIA
+            | scene_traits::TRACKED_MEDIA;
         self.table.traits & traits == traits && (WITH_MEDIA || traits & media == 0)
     }
 

@@ -2,6 +2,7 @@
 
 use crate::math::{Float3, Frame, Vec3};
 use crate::operator::Scatter;
+use crate::slot::{Slot, Stored};
 use bytemuck::{Pod, Zeroable};
 
 /// A point on a surface, as a BSDF sees it.
@@ -104,4 +105,9 @@ pub trait Bsdf: Send + Sync + 'static {
     }
     /// Resolves the BSDF at a point.
     fn closure(&self, at: &SurfacePoint) -> Self::Closure;
+    /// Stores the closure of a point. A BSDF of which some closures need more than others may store one of several types here, so that
+    /// none pays for what only others have; each must scatter as [`closure`](Self::closure) does.
+    fn store(&self, at: &SurfacePoint, slot: Slot<'_>) -> Stored {
+        slot.put(self.closure(at))
+    }
 }

@@ -7,11 +7,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use crate::error::Fallible;
 
 /// Extensions whose meaning is part of the conversion.
-pub(crate) const EXTENSIONS: [&str; 11] = [
+pub(crate) const EXTENSIONS: [&str; 12] = [
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_iridescence",
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",

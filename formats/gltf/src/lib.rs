@@ -9,8 +9,8 @@
 //! Triangles, strips and fans with normals, colours (`COLOR_0`, factors of the base colour and its alpha), tangents where
 //! there is a normal map, and one set of texture coordinates; sparse and quantised accessors; buffers in the
 //! binary chunk, in data URIs and in files; images likewise. Node hierarchies; perspective cameras; KHR_lights_punctual.
-//! Metallic-roughness materials with KHR_materials_clearcoat, _emissive_strength, _ior, _sheen, _specular, _transmission,
-//! _unlit and _volume (a homogeneous medium that absorbs) become the BSDF `principled`; alpha modes the BSDF `mask` around it; normal
+//! Metallic-roughness materials with KHR_materials_clearcoat, _emissive_strength, _ior, _iridescence, _sheen, _specular,
+//! _transmission, _unlit and _volume (a homogeneous medium that absorbs) become the BSDF `principled`; alpha modes the BSDF `mask` around it; normal
 //! textures normal maps; emission that of the shapes. KHR_texture_transform and KHR_mesh_quantization.
 //!
 //! Photometric units are taken as radiometric ones, number by number (1 cd = 1 W/sr, 1 lx = 1 W/m², 1 nt = 1 W/(sr m²) in every

@@ -51,6 +51,8 @@ struct Use {
     space: ColorSpace,
     channel: Option<TextureChannel>,
     scale: [f64; 3],
+    /// Added after that.
+    bias: f64,
     /// Multiplied with the colours of vertices, and there for them alone if the material names no image.
     vertex_color: bool,
 }
@@ -59,6 +61,7 @@ const COLOR: Use = Use {
     space: ColorSpace::Srgb,
     channel: None,
     scale: [1.0; 3],
+    bias: 0.0,
     vertex_color: false,
 };
 
@@ -72,10 +75,13 @@ fn data(channel: TextureChannel, factor: f64) -> Use {
         space: ColorSpace::Linear,
         channel: Some(channel),
         scale: [factor; 3],
+        bias: 0.0,
         vertex_color: false,
     }
 }
 
+/// Largest index of a film.
+const FILM_IOR: f64 = 5.0;
 const UNIT: [f64; 2] = [0.0, 1.0];
 const BRIGHT: [f64; 2] = [0.0, 1e30];
 
@@ -248,6 +254,9 @@ impl<'c> Materials<'c> {
                 block = self.coat_normal(block, m, e, name, out)?;
             }
         }
+        if let Some(e) = of("KHR_materials_iridescence") {
+            block = self.film(block, e, name)?;
+        }
         if let Some(e) = of("KHR_materials_sheen") {
             let tint = numbers(e, "sheenColorFactor", [0.0; 3], UNIT)?;
             let setup = Use {
@@ -276,6 +285,32 @@ impl<'c> Materials<'c> {
             }
         }
         Ok(block)
+    }
+
+    /// A thin film, of a thickness between the two that are given where a texture says so, else of the larger one.
+    fn film(&mut self, block: PluginBlock, e: &Value, name: &str) -> Fallible<PluginBlock> {
+        let factor = number(e, "iridescenceFactor", 0.0, UNIT)?;
+        let ior = number(e, "iridescenceIor", 1.3, [1.0, 1e3])?;
+        let least = number(e, "iridescenceThicknessMinimum", 100.0, BRIGHT)?;
+        let most = number(e, "iridescenceThicknessMaximum", 400.0, BRIGHT)?;
+        if factor == 0.0 {
+            return Ok(block);
+        }
+        let info = e.get("iridescenceTexture");
+        let block = self.scaled(block, info, name, "thin_film", factor, TextureChannel::Red)?;
+        let setup = Use {
+            bias: least,
+            ..data(TextureChannel::Green, most - least)
+        };
+        let info = e.get("iridescenceThicknessTexture");
+        let texture = self.texture(info, name, "thin film thickness", setup)?;
+        if ior > FILM_IOR {
+            let why = format!("an index of {ior} is above {FILM_IOR}, which is taken");
+            self.warn("KHR_materials_iridescence", &why);
+        }
+        Ok(block
+            .with("thin_film_thickness", either(texture, most.into()))
+            .with("thin_film_ior", ior.min(FILM_IOR)))
     }
 
     /// A texture of normals, and the factor on their slope.
@@ -428,6 +463,7 @@ impl<'c> Materials<'c> {
         };
         out.channel = setup.channel;
         out.scale = setup.scale;
+        out.bias = [setup.bias; 3];
         if let Some(t) = extension(info, "KHR_texture_transform") {
             out.uv = uv_transform(
                 numbers(t, "offset", [0.0; 2], [-1e18, 1e18])?,

@@ -141,6 +141,62 @@ fn a_coat_has_its_own_normal_map() {
     assert!(model.warnings.is_empty(), "{:?}", model.warnings);
 }
 
+/// Iridescence is a thin film: red is how much of it there is, green the way from the least thickness to the largest, which holds without a
+/// texture.
+#[test]
+fn iridescence_is_a_thin_film() {
+    let convert = |film: serde_json::Value| {
+        let mut b = Builder::new();
+        let image = b.push("images", json!({"uri": "film.png"}));
+        b.push("textures", json!({"source": image}));
+        let m = b.push(
+            "materials",
+            json!({"extensions": {"KHR_materials_iridescence": film}}),
+        );
+        b.json["extensionsRequired"] = json!(["KHR_materials_iridescence"]);
+        let mesh = b.square(Some(m));
+        b.push("nodes", json!({"mesh": mesh}));
+        b.read()
+    };
+    let all = convert(json!({
+        "iridescenceFactor": 0.75, "iridescenceTexture": {"index": 0}, "iridescenceIor": 1.8,
+        "iridescenceThicknessMinimum": 200, "iridescenceThicknessMaximum": 650,
+        "iridescenceThicknessTexture": {"index": 0}
+    }));
+    let block = &all.materials[0].block;
+    let weight = &all.textures[texture(block, "thin_film").unwrap()];
+    assert_eq!(
+        (weight.channel, weight.scale, weight.bias),
+        (Some(TextureChannel::Red), [0.75; 3], [0.0; 3])
+    );
+    let thickness = &all.textures[texture(block, "thin_film_thickness").unwrap()];
+    assert_eq!(
+        (thickness.channel, thickness.scale, thickness.bias),
+        (Some(TextureChannel::Green), [450.0; 3], [200.0; 3])
+    );
+    assert_eq!(thickness.color_space, ColorSpace::Linear);
+    assert_eq!(number(block, "thin_film_ior"), Some(1.8));
+    assert!(all.warnings.is_empty(), "{:?}", all.warnings);
+
+    let plain = convert(json!({"iridescenceFactor": 1}));
+    let block = &plain.materials[0].block;
+    for (name, value) in [
+        ("thin_film", 1.0),
+        ("thin_film_thickness", 400.0),
+        ("thin_film_ior", 1.3),
+    ] {
+        assert_eq!(number(block, name), Some(value), "{name}");
+    }
+    let none = convert(json!({"iridescenceThicknessMaximum": 300}));
+    assert!(!none.materials[0].block.params.contains_key("thin_film"));
+    let dense = convert(json!({"iridescenceFactor": 1, "iridescenceIor": 7}));
+    assert_eq!(
+        number(&dense.materials[0].block, "thin_film_ior"),
+        Some(5.0)
+    );
+    assert!(dense.warnings[0].starts_with("KHR_materials_iridescence: "));
+}
+
 #[test]
 fn special_materials() {
     let convert = |material| {
@@ -239,13 +295,13 @@ fn extensions_that_are_not_known_are_named() {
     let cube = b.cube();
     b.push("nodes", json!({"mesh": cube}));
     b.json["extensionsUsed"] = json!([
-        "KHR_materials_iridescence",
+        "KHR_materials_dispersion",
         "KHR_materials_sheen",
         "VENDOR_x"
     ]);
     let model = b.read();
     assert_eq!(model.warnings.len(), 2, "{:?}", model.warnings);
-    assert!(model.warnings[0].starts_with("KHR_materials_iridescence: "));
+    assert!(model.warnings[0].starts_with("KHR_materials_dispersion: "));
     b.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression", "KHR_materials_sheen"]);
     let text = b.error();
     assert!(

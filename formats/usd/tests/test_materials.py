@@ -227,8 +227,9 @@ def test_standard_surface(tmp_path: Path) -> None:
     assert params["clearcoat"] == pytest.approx(0.9) and params["clearcoat_ior"] == pytest.approx(1.4) and params["clearcoat_roughness"] == pytest.approx(0.1)
     assert params["sheen"] == pytest.approx(0.3) and params["sheen_color"] == pytest.approx([1, 0.5, 0])
     assert converted.scene["shapes"][0]["emission"] == [2, 1, 0.5]
+    assert params["thin_film"] == 1 and params["thin_film_thickness"] == pytest.approx(300) and params["thin_film_ior"] == pytest.approx(1.5)
     losses = " ".join(converted.losses("/m/s"))
-    assert "subsurface" in losses and "thin_film_thickness" in losses
+    assert "subsurface" in losses and "thin_film" not in losses
 
 
 def test_open_pbr(tmp_path: Path) -> None:
@@ -247,7 +248,36 @@ def test_open_pbr(tmp_path: Path) -> None:
     assert converted.scene["shapes"][0]["emission"] == [10, 10, 10]
     assert params["diffuse_roughness"] == pytest.approx(0.3) and params["clearcoat_color"] == [1, 0.5, 0.5] and params["clearcoat_darkening"] == 1
     assert params["edge_color"] == params["specular_color"] == [0.5, 0.75, 1] and params["clearcoat_ior"] == pytest.approx(1.6)
-    assert any("thin_film_weight" in x for x in converted.losses("/m/s"))
+    # Half a micrometre of index 1.4, which is principled's film as well.
+    assert params["thin_film"] == 1 and "thin_film_thickness" not in params and "thin_film_ior" not in params
+    assert not any("thin_film" in x for x in converted.losses("/m/s"))
+
+
+def test_thin_films(tmp_path: Path) -> None:
+    """OpenPBR's micrometres, also where a texture says how many; without weight or thickness there is no film."""
+    image(tmp_path)
+    kind = "ND_open_pbr_surface_surfaceshader"
+    thickness = 'def Shader "i" { uniform token info:id = "ND_image_float"; asset inputs:file = @./t.png@; float outputs:out }'
+    material, converted = surface(
+        tmp_path,
+        "float inputs:thin_film_weight = 0.75; float inputs:thin_film_thickness.connect = </m/i.outputs:out>; float inputs:thin_film_ior = 1.8",
+        thickness,
+        kind,
+    )
+    params = material["params"]
+    texture = converted.scene["textures"][params["thin_film_thickness"]["texture"]]
+    assert params["thin_film"] == 0.75 and params["thin_film_ior"] == pytest.approx(1.8) and texture["scale"] == pytest.approx(1000)
+    material, _ = surface(tmp_path, "float inputs:thin_film_weight = 1; float inputs:thin_film_thickness = 0.35", kind=kind)
+    assert material["params"]["thin_film_thickness"] == pytest.approx(350)
+    for kind, off in (
+        (kind, "float inputs:thin_film_weight = 0; float inputs:thin_film_ior = 2"),
+        (kind, "float inputs:thin_film_weight = 1; float inputs:thin_film_thickness = 0"),
+        ("ND_standard_surface_surfaceshader", "float inputs:thin_film_thickness = 0; float inputs:thin_film_IOR = 2"),
+    ):
+        material, converted = surface(tmp_path, off, kind=kind)
+        assert not any(name.startswith("thin_film") for name in material["params"]) and not converted.losses("/m/s")
+    material, converted = surface(tmp_path, "float inputs:thin_film_weight = 1; float inputs:thin_film_ior = 7", kind="ND_open_pbr_surface_surfaceshader")
+    assert material["params"]["thin_film_ior"] == 5 and any("thin_film_ior" in x for x in converted.losses("/m/s"))
 
 
 BUMPS = """

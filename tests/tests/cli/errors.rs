@@ -79,6 +79,11 @@ fn wrong_options() {
             &["--plugin-path no/such", "no such folder"],
         ),
         (&["--integrator", "pr"], &["'pr'", "did you mean 'pt'"]),
+        (
+            &["--integrator", "bdpt", "--reuse", "4"],
+            &["--reuse is for the integrator pt; this is bdpt"],
+        ),
+        (&["--reuse", "9"], &["--reuse", "1..=8"]),
     ] {
         usage(args, words);
     }

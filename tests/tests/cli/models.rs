@@ -310,7 +310,7 @@ fn a_bare_model_is_framed_and_lit() {
 fn models_stand_in_scenes() {
     let at = folder("models-scene");
     let mut model = squares(&[(json!({}), [0.0; 3])], None);
-    model.0["extensionsUsed"] = json!(["KHR_materials_iridescence"]);
+    model.0["extensionsUsed"] = json!(["KHR_materials_dispersion"]);
     write_glb(&at.join("tile.glb"), &model);
     let scene = json!({
         "resolvent": 1,
@@ -328,7 +328,7 @@ fn models_stand_in_scenes() {
     )
     .done();
     assert!(
-        run.stderr.contains("tile.glb: KHR_materials_iridescence"),
+        run.stderr.contains("tile.glb: KHR_materials_dispersion"),
         "{run:?}"
     );
     assert!((mean(&picture(&at.join("out.exr"))) - 0.5).abs() < 0.01);

@@ -294,6 +294,34 @@ fn another_seed_is_another_picture() {
 }
 
 /// An integrator with its parameters, and the same by the path of its library.
+/// `--reuse` is the parameter of `pt`; parts of shared paths make the same picture as one render.
+#[test]
+fn paths_are_shared_on_request() {
+    let at = folder("reuse");
+    let plain = scene("bench/box_fog.json");
+    let asks = changed(&at, "bench/box_fog.json", |s| {
+        s["integrator"]["params"]["reuse"] = 3.into();
+    });
+    let options = ["--resolution", "40x24", "--spp", "32"];
+    let with = [&options[..], &["--reuse", "3"]].concat();
+    let shared = bits(&render(&at, &plain, "flag.exr", &with));
+    assert!(shared == bits(&render(&at, &asks, "scene.exr", &options)));
+    assert!(shared != bits(&render(&at, &plain, "alone.exr", &options)));
+    for range in ["0..11", "11..32"] {
+        let part = [
+            "--sample-range",
+            range,
+            "--checkpoint",
+            &format!("{range}.ckpt"),
+        ];
+        let part = [&with[..2], &with[4..], &part].concat();
+        render(&at, &plain, "part.exr", &part);
+    }
+    let merge = ["merge", "0..11.ckpt", "11..32.ckpt", "-o", "merged.exr"];
+    Run::new(&at, merge).done();
+    assert!(shared == bits(&picture(&at.join("merged.exr"))));
+}
+
 #[test]
 fn integrators_by_path() {
     let at = folder("integrator");

@@ -24,6 +24,8 @@ pub mod scene_traits {
     pub const HITTABLE_LIGHTS: u32 = 32;
     /// Has an environment.
     pub const ENVIRONMENT: u32 = 64;
+    /// Some medium's transmittances are random estimates, not in closed form. Since minor version 4.
+    pub const TRACKED_MEDIA: u32 = 128;
 }
 
 /// The scene as an integrator sees it. Functions return [`Status::OK`], [`Status::NONE`] where stated, or an error, on

@@ -11,6 +11,7 @@ use crate::operator::*;
 use crate::panics::panic_text;
 use crate::params::Host;
 use crate::phase::{MediumPoint, PhaseFunction};
+use crate::slot::Slot;
 use crate::spectrum::Spectrum;
 use crate::surface::{Bsdf, SurfacePoint};
 use core::ffi::c_void;
@@ -209,8 +210,6 @@ impl<T: Plugin + PhaseFunction> PhaseShim<T> {
 pub struct BsdfShim<T>(PhantomData<T>);
 
 impl<T: Plugin + Bsdf> BsdfShim<T> {
-    const SCATTER: &'static ScatterTable = &ScatterShim::<T::Closure>::TABLE;
-
     /// The table.
     pub const TABLE: BsdfTable = BsdfTable {
         size: size_of::<BsdfTable>() as u32,
@@ -249,8 +248,8 @@ impl<T: Plugin + Bsdf> BsdfShim<T> {
         // SAFETY: a live instance and valid pointers, by the ABI.
         let (i, at) = unsafe { (instance::<T>(p), &*at) };
         guarded(i.host, || {
-            // SAFETY: the table is the one made for this closure type; `out` is valid for writing.
-            unsafe { Closure::store(out, Self::SCATTER, i.value.closure(at)) };
+            // SAFETY: `out` is valid for writing.
+            i.value.store(at, unsafe { Slot::new(out) });
             Status::OK
         })
     }

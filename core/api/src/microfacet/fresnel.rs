@@ -116,6 +116,12 @@ impl Tinted {
         Self { f0, b }
     }
 
+    /// Reflectance at normal incidence.
+    #[inline(always)]
+    pub fn f0(&self) -> Spectrum {
+        self.f0
+    }
+
     /// Reflectance at cosine `cos`.
     #[inline]
     pub fn at(&self, cos: f32) -> Spectrum {

@@ -1,13 +1,14 @@
 //! The boundary of a dielectric: reflection and transmission, smooth or rough, refracting or thin-walled.
 
 use super::SMOOTH_BELOW;
+use super::coating::{Bare, Coating};
 use super::energy::Width;
 use super::exits::{self, Exits};
-use super::fresnel;
 use super::ggx::{Ggx, reflect};
+use super::{facets, fresnel};
 use crate::math::{Vec3, warp};
 use crate::operator::{Measure, ScatterDraws, ScatterEval, ScatterSample};
-use crate::spectrum::Spectrum;
+use crate::spectrum::{Lanes, Spectrum};
 use core::f32::consts::FRAC_1_PI;
 
 /// Deviation of refracted rays below which a rough boundary counts as smooth: half vectors of directions in single precision
@@ -82,6 +83,26 @@ impl Interface {
         out
     }
 
+    /// The boundary as it is under a coating, by which less or more light meets several facets, in the mean of all colours.
+    pub fn under<C: Coating>(mut self, coating: &C) -> Self {
+        if C::IS_BARE || self.smooth || self.thin {
+            return self;
+        }
+        let adds = average(|mu| added(coating, mu, self.eta, false));
+        let f = fresnel::dielectric_average(self.eta) + adds;
+        // 1 − F(1/η) = (1 − F(η))/η².
+        let back = 1.0 - (1.0 - f) / (self.eta * self.eta);
+        let lost = [(self.eta, false), (1.0 / self.eta, true)].map(|(eta, inside)| {
+            let more = |mu| {
+                let w = warp::around_z(mu, 0.125);
+                self.lost_under(coating, w, eta, inside) - self.lost(w, eta)
+            };
+            (1.0 - self.width.total_average(eta) + average(more)).max(1e-6)
+        });
+        self.share_out(f, back, lost);
+        self
+    }
+
     /// Shares of what meets more than one facet.
     fn share(&mut self) {
         let f = fresnel::dielectric_average(self.eta);
@@ -94,6 +115,11 @@ impl Interface {
         let back = fresnel::dielectric_average(1.0 / self.eta);
         let lost =
             [self.eta, 1.0 / self.eta].map(|eta| (1.0 - self.width.total_average(eta)).max(1e-6));
+        self.share_out(f, back, lost);
+    }
+
+    /// The same from the mean reflectances and the lost shares for diffuse light, from above and from below.
+    fn share_out(&mut self, f: f32, back: f32, lost: [f32; 2]) {
         let least = lost[0].min(lost[1]);
         self.norm = lost.map(|l| FRAC_1_PI / l);
         self.reflects = [
@@ -144,8 +170,12 @@ impl Interface {
 
     /// Reflectance of the wall or the boundary itself.
     #[inline(always)]
-    fn wall(&self, f: f32) -> f32 {
-        if self.thin { 2.0 * f / (1.0 + f) } else { f }
+    fn wall<V: Lanes>(&self, f: V) -> V {
+        if self.thin {
+            V::splat(2.0) * f / (V::splat(1.0) + f)
+        } else {
+            f
+        }
     }
 
     /// Share of the light from `w` that meets more than one facet; `eta` as seen from its side.
@@ -156,6 +186,23 @@ impl Interface {
         } else {
             1.0 - self.width.total(w, eta)
         }
+    }
+
+    /// [`lost`](Self::lost) under a coating: what it lets reflect in place of passing is masked otherwise.
+    #[inline(always)]
+    fn lost_under<C: Coating>(&self, coating: &C, w: Vec3, eta: f32, inside: bool) -> f32 {
+        let lost = self.lost(w, eta);
+        if C::IS_BARE || self.thin {
+            return lost;
+        }
+        let (mirrors, reflects) = (self.width.single(w), self.width.reflected(w, eta));
+        // What facets that reflect nothing would let pass, about.
+        let passes = (1.0 - lost - reflects) * mirrors / (mirrors - reflects).max(1e-3);
+        let mut adds = 0.0;
+        for (cos, weight) in facets::cosines(w.z, self.width.isotropic()) {
+            adds += weight * added(coating, cos, eta, inside);
+        }
+        (lost - adds * (mirrors - passes)).clamp(0.0, 0.99)
     }
 
     #[inline(always)]
@@ -179,6 +226,12 @@ impl Interface {
     /// Value (per power, sr⁻¹) and densities; all zero if smooth.
     #[inline]
     pub fn eval(&self, wo: Vec3, wi: Vec3) -> ScatterEval {
+        self.eval_under(&Bare, wo, wi)
+    }
+
+    /// [`eval`](Self::eval) under a coating, which [`under`](Self::under) was told of. Light that meets several facets is not coloured by it.
+    #[inline]
+    pub fn eval_under<C: Coating>(&self, coating: &C, wo: Vec3, wi: Vec3) -> ScatterEval {
         if self.smooth || wo.z.abs() < GRAZING || wi.z.abs() < GRAZING {
             return ScatterEval::default();
         }
@@ -189,12 +242,13 @@ impl Interface {
             true => 1.0 / t.eta,
             false => t.eta,
         };
-        let lo = self.lost(t.wo, t.eta);
-        let li = self.lost(t.wi, eta_i);
+        let inside = self.inside(&t);
+        let lo = self.lost_under(coating, t.wo, t.eta, inside);
+        let li = self.lost_under(coating, t.wi, eta_i, inside != (crosses && !self.thin));
         let once = if crosses && !self.thin {
-            self.refract_once(&t)
+            self.refract_once(coating, &t)
         } else {
-            self.reflect_once(&t, crosses)
+            self.reflect_once(coating, &t, crosses)
         };
         let (xo, xi) = (self.reflects[there], self.reflects[back]);
         let (xo, xi) = if crosses {
@@ -211,16 +265,17 @@ impl Interface {
 
     /// Reflection at one facet; with `passes`, the thin wall's transmission, which is the same mirrored.
     #[inline(always)]
-    fn reflect_once(&self, t: &Turned, passes: bool) -> ScatterEval {
+    fn reflect_once<C: Coating>(&self, coating: &C, t: &Turned, passes: bool) -> ScatterEval {
         let wi = if passes { flip(t.wi) } else { t.wi };
         let Some(h) = (t.wo + wi).try_normalize() else {
             return ScatterEval::default();
         };
-        let f = self.wall(fresnel::dielectric(t.wo.dot(h), t.eta).0);
-        let share = if passes { 1.0 - f } else { f };
-        let d = 0.25 * share * self.ggx.d(h);
+        let f = self.wall(coating.reflects(t.wo.dot(h), t.eta, self.inside(t)).0);
+        let share = if passes { C::Value::splat(1.0) - f } else { f };
+        let normals = self.ggx.d(h);
+        let d = 0.25 * C::mean(share) * normals;
         ScatterEval {
-            f: Spectrum::splat(d * self.ggx.g2_over_cos(t.wo, wi)),
+            f: (share * 0.25 * normals * self.ggx.g2_over_cos(t.wo, wi)).spectrum(),
             forward: d * self.ggx.g1_over_cos(t.wo),
             reverse: d * self.ggx.g1_over_cos(wi),
         }
@@ -228,7 +283,7 @@ impl Interface {
 
     /// Refraction by one facet (Walter et al. 2007, eq. 16, 17 and 21).
     #[inline(always)]
-    fn refract_once(&self, t: &Turned) -> ScatterEval {
+    fn refract_once<C: Coating>(&self, coating: &C, t: &Turned) -> ScatterEval {
         let Some(h) = (t.wo + t.eta * t.wi).try_normalize() else {
             return ScatterEval::default();
         };
@@ -238,13 +293,16 @@ impl Interface {
         if !(co > 0.0 && ci < 0.0) {
             return ScatterEval::default();
         }
-        let share = fresnel::transmittance(co, -ci, t.eta) * self.ggx.d(h);
+        let normals = self.ggx.d(h);
+        let passes = coating.passes(co, -ci, t.eta, self.inside(t));
+        let share = C::mean(passes) * normals;
         // dh/dωi with lengths in units of the index on the side of wi, and dh/dωo likewise.
         let (bent_i, bent_o) = (ci + co / t.eta, co + ci * t.eta);
         let forward = share * co * -ci / (bent_i * bent_i);
         let reverse = share * co * -ci / (bent_o * bent_o);
+        let value = passes * normals * co * -ci / C::Value::splat(bent_i * bent_i);
         ScatterEval {
-            f: Spectrum::splat(forward * self.ggx.g2_over_cos(t.wo, t.wi)),
+            f: (value * self.ggx.g2_over_cos(t.wo, t.wi)).spectrum(),
             forward: forward * self.ggx.g1_over_cos(t.wo),
             reverse: reverse * self.ggx.g1_over_cos(t.wi),
         }
@@ -254,23 +312,39 @@ impl Interface {
     /// and 1 for transmission.
     #[inline]
     pub fn sample(&self, wo: Vec3, u: ScatterDraws) -> Option<ScatterSample> {
+        self.sample_under(&Bare, wo, u)
+    }
+
+    /// [`sample`](Self::sample) under a coating; the weight of a smooth boundary is then that of the colours among each other.
+    #[inline]
+    pub fn sample_under<C: Coating>(
+        &self,
+        coating: &C,
+        wo: Vec3,
+        u: ScatterDraws,
+    ) -> Option<ScatterSample> {
         if wo.z == 0.0 {
             return None;
         }
         let t = self.turn(wo, wo);
         let (wi, crosses) = if self.smooth {
-            let (f, cos) = fresnel::dielectric(t.wo.z, t.eta);
-            let f = self.wall(f);
+            let (f, cos) = coating.reflects(t.wo.z, t.eta, self.inside(&t));
+            let shares = self.wall(f);
+            let f = C::mean(shares);
             let crosses = u.lobe >= f;
             let wi = match (crosses, self.thin) {
                 (false, _) => Vec3::new(-t.wo.x, -t.wo.y, t.wo.z),
                 (true, true) => -t.wo,
                 (true, false) => Vec3::new(-t.wo.x / t.eta, -t.wo.y / t.eta, -cos).normalize(),
             };
-            let p = if crosses { 1.0 - f } else { f };
+            let (p, share) = if crosses {
+                (1.0 - f, C::Value::splat(1.0) - shares)
+            } else {
+                (f, shares)
+            };
             let wi = if t.side == 1 { flip(wi) } else { wi };
             return Some(ScatterSample {
-                weight: Spectrum::ONE,
+                weight: C::relative(share, p),
                 wi: wi.into(),
                 eta: self.bend(crosses, t.eta),
                 forward: p,
@@ -279,13 +353,13 @@ impl Interface {
                 lobe: u32::from(crosses),
             });
         } else {
-            self.direction(&t, u)?
+            self.direction(coating, &t, u)?
         };
         if wi.z == 0.0 || (wi.z < 0.0) != crosses {
             return None;
         }
         let wi = if t.side == 1 { flip(wi) } else { wi };
-        let e = self.eval(wo, wi);
+        let e = self.eval_under(coating, wo, wi);
         (e.forward > 0.0).then(|| ScatterSample {
             weight: e.f * (wi.z.abs() / e.forward),
             wi: wi.into(),
@@ -297,6 +371,12 @@ impl Interface {
         })
     }
 
+    /// True if light comes from within the body, where a coating lies behind its boundary.
+    #[inline(always)]
+    fn inside(&self, t: &Turned) -> bool {
+        t.side == 1 && !self.thin
+    }
+
     #[inline(always)]
     fn bend(&self, crosses: bool, eta: f32) -> f32 {
         if crosses && !self.thin { eta } else { 1.0 }
@@ -304,8 +384,13 @@ impl Interface {
 
     /// A direction from rough facets, with `wo` above, and whether it was meant to cross.
     #[inline(always)]
-    fn direction(&self, t: &Turned, u: ScatterDraws) -> Option<(Vec3, bool)> {
-        let lost = self.lost(t.wo, t.eta);
+    fn direction<C: Coating>(
+        &self,
+        coating: &C,
+        t: &Turned,
+        u: ScatterDraws,
+    ) -> Option<(Vec3, bool)> {
+        let lost = self.lost_under(coating, t.wo, t.eta, self.inside(t));
         if u.lobe < lost {
             let wi = warp::cosine_hemisphere(u.dir);
             let crosses = u.lobe >= lost * self.reflects[t.side];
@@ -314,8 +399,8 @@ impl Interface {
         let u_side = (u.lobe - lost) / (1.0 - lost);
         let h = self.ggx.sample(t.wo, u.dir);
         let co = t.wo.dot(h);
-        let (f, cos) = fresnel::dielectric(co, t.eta);
-        if u_side < self.wall(f) {
+        let (f, cos) = coating.reflects(co, t.eta, self.inside(t));
+        if u_side < C::mean(self.wall(f)) {
             return Some((reflect(t.wo, h), false));
         }
         if self.thin {
@@ -324,6 +409,19 @@ impl Interface {
         let wi = h * (co / t.eta - cos) - t.wo / t.eta;
         Some((wi.try_normalize()?, true))
     }
+}
+
+/// What a coating adds to the reflectance of a facet, in the mean of all colours.
+#[inline(always)]
+fn added<C: Coating>(coating: &C, cos: f32, eta: f32, inside: bool) -> f32 {
+    C::mean(coating.reflects(cos, eta, inside).0) - fresnel::dielectric(cos, eta).0
+}
+
+/// Mean for diffuse light, 2 ∫ f(μ) μ dμ, of what is smooth.
+fn average(f: impl Fn(f32) -> f32) -> f32 {
+    const N: u32 = 12;
+    let at = |i: u32| ((i as f32 + 0.5) / N as f32).sqrt();
+    (0..N).map(|i| f(at(i)) / N as f32).sum()
 }
 
 /// Mirrored at the surface.

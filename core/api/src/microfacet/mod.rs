@@ -4,8 +4,11 @@
 //! All directions are in the shading frame and point away from the surface; the facets' normal `h` has z > 0.
 
 pub mod boundary;
+pub mod coating;
 pub mod energy;
 pub mod exits;
+pub mod facets;
+pub mod film;
 pub mod fresnel;
 mod ggx;
 mod grain;
@@ -13,6 +16,8 @@ mod interface;
 mod reflector;
 
 pub use boundary::Boundary;
+pub use coating::{Bare, Coating};
+pub use film::Film;
 pub use ggx::Ggx;
 pub use grain::Grain;
 pub use interface::Interface;

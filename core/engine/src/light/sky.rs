@@ -11,8 +11,8 @@
 use super::{ImageEnvironment, Light};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use resolvent_api::Spectrum;
 use resolvent_api::math::Vec3;
+use resolvent_api::{Spectrum, observer};
 use std::f64::consts::PI;
 
 /// Luminous efficacy of the unit, lm/W.
@@ -131,13 +131,8 @@ impl Sky {
 }
 
 /// Linear sRGB of CIE XYZ; colours outside of it are moved to its edge.
-fn rgb([x, y, z]: [f64; 3]) -> [f64; 3] {
-    [
-        3.240_454_2 * x - 1.537_138_5 * y - 0.498_531_4 * z,
-        -0.969_266_0 * x + 1.876_010_8 * y + 0.041_556_0 * z,
-        0.055_643_4 * x - 0.204_025_9 * y + 1.057_225_2 * z,
-    ]
-    .map(|v| v.max(0.0))
+fn rgb(xyz: [f64; 3]) -> [f64; 3] {
+    observer::rgb(xyz).map(|v| v.max(0.0))
 }
 
 /// Radiance of the sun outside the atmosphere, 10 W·sr⁻¹·m⁻²·nm⁻¹, from 380 to 750 nm in steps of 10 nm (table 2 of the paper).
@@ -164,25 +159,11 @@ fn sunlight(transmittance: impl Fn(f64, f64) -> f64) -> [f64; 3] {
     for (i, (radiance, ozone)) in SUN.iter().zip(OZONE).enumerate() {
         let nm = 380.0 + 10.0 * i as f64;
         let power = 10.0 * radiance * SUN_SOLID_ANGLE * 10.0 * transmittance(nm, ozone);
-        for (sum, matching) in xyz.iter_mut().zip(observer(nm)) {
+        for (sum, matching) in xyz.iter_mut().zip(observer::matching(nm)) {
             *sum += power * matching;
         }
     }
     xyz
-}
-
-/// CIE 1931 colour matching functions in the fit of Wyman, Sloan & Shirley 2013, eq. 4.
-fn observer(nm: f64) -> [f64; 3] {
-    let lobe = |height: f64, middle: f64, below: f64, above: f64| {
-        let t = (nm - middle) / if nm < middle { below } else { above };
-        height * (-0.5 * t * t).exp()
-    };
-    [
-        lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7)
-            - lobe(0.065, 501.1, 20.4, 26.2),
-        lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1),
-        lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8),
-    ]
 }
 
 /// A sun and a sky as a scene describes them.

@@ -542,8 +542,10 @@ fn traits(media: &[PlacedMedium], surfaces: bool, lights: &Lights) -> u32 {
     let mut set = |on: bool, bit: u32| t |= if on { bit } else { 0 };
     set(surfaces, scene_traits::SURFACES);
     set(!media.is_empty(), scene_traits::MEDIA);
+    let tracked = |m: &PlacedMedium| m.medium.info.traits & medium_traits::ANALYTIC == 0;
     let emissive = |m: &PlacedMedium| m.medium.info.traits & medium_traits::EMISSIVE != 0;
     set(media.iter().any(emissive), scene_traits::EMISSIVE_MEDIA);
+    set(media.iter().any(tracked), scene_traits::TRACKED_MEDIA);
     let surface_lights = surfaces && !lights.chooser(false).is_empty();
     let medium_lights = !media.is_empty() && !lights.chooser(true).is_empty();
     set(surface_lights || medium_lights, scene_traits::LIGHTS);

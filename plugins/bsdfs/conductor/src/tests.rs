@@ -5,7 +5,7 @@ use resolvent_tests::Suite;
 use resolvent_tests::host::create;
 use resolvent_tests::scatter::{Measured, albedo, check_around, directions};
 
-fn surface(params: &str) -> Surface {
+fn surface(params: &str) -> <Conductor as Bsdf>::Closure {
     let plugin: Conductor = create(params).unwrap_or_else(|e| panic!("{params}: {e}"));
     plugin.closure(&SurfacePoint::default())
 }
@@ -30,6 +30,10 @@ fn samples_follow_their_density() {
         (
             r#"{ "eta": [0.2, 0.9, 1.1], "k": [3, 2, 2], "roughness": 0.3, "anisotropy": 0.5 }"#,
             at(0.8, 0.45),
+        ),
+        (
+            r#"{ "metal": "W", "roughness": 0.5, "thin_film": 1, "thin_film_thickness": 200, "thin_film_ior": 2.3 }"#,
+            at(0.7, 0.45),
         ),
     ] {
         let k = surface(params);
@@ -100,6 +104,41 @@ fn mirrors_of_measured_metals() {
     let s = gold.sample(Vec3::Z, ScatterDraws::default(), Mode::Radiance);
     let [r, g, b] = s.unwrap().weight.to_rgb();
     assert!(r > 0.9 && r > g && g > b && b < 0.6, "{r} {g} {b}");
+}
+
+/// A film colours what is reflected, loses nothing over what reflects everything, and is none without thickness or presence.
+#[test]
+fn films_on_metals() {
+    let mut suite = Suite::new();
+    let film = r#""thin_film": 0.8, "thin_film_thickness": 150, "thin_film_ior": 2.3"#;
+    let k = surface(&format!(r#"{{ "metal": "Cr", {film} }}"#));
+    assert!(matches!(k, Either::B(_)));
+    let (_, eta, absorbs) = metals::METALS[4];
+    for z in [1.0, 0.6, 0.2] {
+        let s = k.sample(at(z, 0.2), ScatterDraws::default(), Mode::Radiance);
+        let weight = s.unwrap().weight;
+        let exact = Film::new(0.8, 150.0, 2.3, 1.0).at(z, rgb(eta), rgb(absorbs));
+        for lane in 0..3 {
+            suite.close("mirror", weight[lane].into(), exact[lane].into(), 1e-4, 0.0);
+        }
+    }
+    for roughness in [0.0, 0.4, 1.0] {
+        let perfect = surface(&format!(
+            r#"{{ "eta": 1e-3, "k": 1e3, "roughness": {roughness}, {film} }}"#
+        ));
+        for z in [1.0, 0.5, 0.1] {
+            let a = albedo(&perfect, at(z, 0.1), 20_000);
+            suite.close("furnace", a[1], 1.0, 0.0, 0.01);
+        }
+    }
+    for off in [
+        r#""thin_film": 0"#,
+        r#""thin_film": 1, "thin_film_thickness": 0"#,
+    ] {
+        let k = surface(&format!(r#"{{ "metal": "Cr", {off} }}"#));
+        assert!(matches!(k, Either::A(_)));
+    }
+    suite.assert();
 }
 
 /// Towards roughness 0 the albedo is the mirror's, and the brightest direction its own.

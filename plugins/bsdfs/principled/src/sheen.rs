@@ -13,14 +13,14 @@ const NODES: usize = 28;
 const NARROWEST: f32 = 0.005;
 
 /// f for white fibres, per steradian; `wo` and `wi` on one side.
-#[inline]
+#[inline(always)]
 pub fn value(wo: Vec3, wi: Vec3, roughness: f32) -> f32 {
     let most = look_up(wo.z, roughness).max(look_up(wi.z, roughness));
     microfacets(wo, wi, roughness) / most.max(1.0)
 }
 
 /// The value of the model itself.
-#[inline]
+#[inline(always)]
 fn microfacets(wo: Vec3, wi: Vec3, roughness: f32) -> f32 {
     let up = 1f32.copysign(wo.z);
     let Some(h) = (wo + wi).try_normalize() else {
@@ -37,7 +37,7 @@ fn microfacets(wo: Vec3, wi: Vec3, roughness: f32) -> f32 {
 }
 
 /// Λ(θ), eq. 3 and table 1: a curve fitted to the distribution's shadowing up to 60° and mirrored beyond.
-#[inline]
+#[inline(always)]
 fn shadowing(cos: f32, alpha: f32) -> f32 {
     let sharp = (1.0 - alpha) * (1.0 - alpha);
     let mix = |at0: f32, at1: f32| at1 + sharp * (at0 - at1);
@@ -63,13 +63,13 @@ pub fn albedo(mu: f32, roughness: f32) -> f32 {
 }
 
 /// Albedo of the model itself.
-#[inline]
+#[inline(always)]
 fn look_up(mu: f32, roughness: f32) -> f32 {
     static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
     interpolate(TABLE.get_or_init(|| tabulate(microfacets)), mu, roughness)
 }
 
-#[inline]
+#[inline(always)]
 fn interpolate(table: &[f32], mu: f32, roughness: f32) -> f32 {
     let node = |x: f32| {
         let x = x.clamp(0.0, 1.0) * (NODES - 1) as f32;
@@ -82,15 +82,15 @@ fn interpolate(table: &[f32], mu: f32, roughness: f32) -> f32 {
 }
 
 /// Albedos at all nodes, when fuzz is first asked for.
-fn tabulate(f: fn(Vec3, Vec3, f32) -> f32) -> Vec<f32> {
+fn tabulate(f: impl Fn(Vec3, Vec3, f32) -> f32) -> Vec<f32> {
     let at = |k: usize| k as f32 / (NODES - 1) as f32;
     (0..NODES * NODES)
-        .map(|i| integrate(at(i % NODES).powi(2).max(1e-4), at(i / NODES), f) as f32)
+        .map(|i| integrate(at(i % NODES).powi(2).max(1e-4), at(i / NODES), &f) as f32)
         .collect()
 }
 
 /// ∫ f cos θ_i dω_i by midpoints, finer towards grazing directions where fibres are bright.
-pub(crate) fn integrate(mu: f32, roughness: f32, f: fn(Vec3, Vec3, f32) -> f32) -> f64 {
+pub(crate) fn integrate(mu: f32, roughness: f32, f: impl Fn(Vec3, Vec3, f32) -> f32) -> f64 {
     const N: usize = 40;
     let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
     let mut sum = 0.0;

@@ -1,12 +1,15 @@
 //! The layers at a point, and how they scatter together.
 
+use crate::boundary::Boundary;
 use crate::diffuse::Diffuse;
 use crate::layers::{Layers, Passed, darkening};
+use crate::skin::Skin;
 use crate::{Parameters, sheen};
 use core::f32::consts::{FRAC_1_PI, FRAC_1_SQRT_2};
 use resolvent_api::math::warp;
+use resolvent_api::microfacet::energy::Width;
 use resolvent_api::microfacet::fresnel::{self, Tinted};
-use resolvent_api::microfacet::{Interface, Reflector, SMOOTH_BELOW, alpha};
+use resolvent_api::microfacet::{Film, Interface, Reflector, SMOOTH_BELOW, alpha};
 use resolvent_api::operator::{Measure, lobes};
 use resolvent_api::{Mode, Scatter, ScatterDraws, ScatterEval, ScatterSample, Spectrum, Vec3};
 
@@ -23,42 +26,10 @@ const LOBES: usize = 6;
 /// Index whose Fresnel curve leads from a reflectance that is given itself to that at grazing.
 const CURVE_IOR: f32 = 1.5;
 
-/// The dielectric's reflectance: Fresnel's curve for `eta`, from the colour `f0` at normal incidence to `f90` at grazing.
+/// All layers, resolved; what lies on the base directly is `S`.
 #[derive(Clone, Copy, Debug)]
-struct Boundary {
-    f0: Spectrum,
-    f90: f32,
-    /// At least 1: seen from the thinner side.
-    eta: f32,
-    /// Reflectance of `eta` at normal incidence.
-    normal: f32,
-}
-
-impl Boundary {
-    /// From 0 at normal incidence to 1 at grazing, given the reflectance of `eta`.
-    #[inline(always)]
-    fn curve(&self, f: f32) -> f32 {
-        ((f - self.normal) / (1.0 - self.normal)).max(0.0)
-    }
-
-    #[inline(always)]
-    fn mix(&self, curve: f32) -> Spectrum {
-        self.f0.map(|f0| f0 + (self.f90 - f0) * curve)
-    }
-
-    #[inline(always)]
-    fn at(&self, cos: f32) -> Spectrum {
-        self.mix(self.curve(fresnel::dielectric(cos, self.eta).0))
-    }
-
-    fn average(&self) -> Spectrum {
-        self.mix(self.curve(fresnel::dielectric_average(self.eta)))
-    }
-}
-
-/// All layers, resolved.
-#[derive(Clone, Copy, Debug)]
-pub struct Surface {
+pub struct Surface<S> {
+    skin: S,
     boundary: Boundary,
     metal: Tinted,
     /// Share of the metal, times what the coat above darkens it by.
@@ -94,7 +65,7 @@ struct Passage {
     choice: [f32; LOBES],
 }
 
-impl Surface {
+impl<S: Skin> Surface<S> {
     /// The layers that the parameters describe, in surroundings of index `outside`.
     pub fn new(p: &Parameters, outside: f32, lanes: u32) -> Self {
         let eta = p.ior / outside;
@@ -123,15 +94,32 @@ impl Surface {
         let widths = alpha(p.roughness, p.anisotropy).map(narrowest);
         let rough = |average| Reflector::new(widths, average, lanes);
         let is_rough = p.roughness >= SMOOTH_BELOW;
-        let average = metal.average() * metallic + boundary.average() * opaque;
+        let skin = S::new(p, outside, &metal);
+        // Of a part that is not there a film need not be asked.
+        let asked = |there: bool| there || S::IS_BARE;
+        let metal_average = match asked(p.metallic > 0.0) {
+            true => skin.metal_average(&metal),
+            false => Spectrum::ZERO,
+        };
+        let boundary_average = match asked(opaque > 0.0) {
+            true => skin.boundary_average(&boundary),
+            false => Spectrum::ZERO,
+        };
+        let average = metal_average * metallic + boundary_average * opaque;
         let tint = p.transmission_color.unwrap_or(p.base_color);
         let outer = p.specular_color.map(|c| c.min(1.0)) * p.specular;
         let body_widths = if is_rough { widths } else { [0.0; 2] };
         let body = Interface::new(body_widths, eta, p.thin);
+        let body = if transparent > 0.0 {
+            body.under(skin.coat())
+        } else {
+            body
+        };
         let mut layers = Layers::new(p, outside, transparent == 0.0 || p.thin, lanes);
         let facets = is_rough.then_some(widths);
         layers.over(facets, (transparent > 0.0).then_some(&body));
         let mut out = Self {
+            skin,
             boundary,
             metal,
             metallic,
@@ -148,7 +136,7 @@ impl Surface {
             lanes,
         };
         if let Some(r) = &out.rough {
-            out.multiple = r.multiple_reflectance(boundary.average());
+            out.multiple = r.multiple_reflectance(boundary_average);
         }
         if opaque > 0.0 && !p.base_color.is_zero() {
             let reaches = out.mean_to_base().map(|r| r.max(1e-4));
@@ -170,11 +158,16 @@ impl Surface {
         let reaches = |e: Spectrum| e.map(|e| 1.0 - e);
         if self.layers.is_bare() {
             return match &self.rough {
-                None => reaches(self.boundary.average()),
+                None => reaches(self.skin.boundary_average(&self.boundary)),
                 Some(r) => {
                     let once = r.width().single_average();
                     let f = r.width().reflected_average(self.boundary.eta);
-                    reaches(self.boundary_albedo(once, f))
+                    let share = self.boundary_albedo(once, f);
+                    if S::IS_BARE {
+                        return reaches(share);
+                    }
+                    let adds = Film::average(|mu| self.adds(r.width(), warp::around_z(mu, 0.125)));
+                    reaches(share + adds)
                 }
             };
         }
@@ -205,12 +198,23 @@ impl Surface {
     #[inline(always)]
     fn boundary_share(&self, w: Vec3) -> Spectrum {
         match &self.rough {
-            None => self.boundary.at(w.z.abs()),
+            None => self.skin.boundary(&self.boundary, w.z.abs()),
             Some(r) => {
-                let f = r.width().reflected(w, self.boundary.eta);
-                self.boundary_albedo(r.width().single(w), f)
+                let width = r.width();
+                let (once, f) = (width.single(w), width.reflected(w, self.boundary.eta));
+                let share = self.boundary_albedo(once, f);
+                if S::IS_BARE {
+                    return share;
+                }
+                (share + self.adds(width, w)).map(|v| v.clamp(0.0, 1.0))
             }
         }
+    }
+
+    /// What the skin adds to the boundary's albedo for light from `w`.
+    #[inline(always)]
+    fn adds(&self, width: &Width, w: Vec3) -> Spectrum {
+        self.skin.adds(&self.boundary, w.z, width.isotropic()) * width.single(w)
     }
 
     #[inline(always)]
@@ -226,7 +230,7 @@ impl Surface {
         let metal = if self.metallic.is_zero() {
             0.0
         } else {
-            mean(self.metallic * self.metal.at(w.z.abs()))
+            mean(self.metallic * self.skin.metal_roughly(&self.metal, w.z.abs()))
         };
         let (fuzz, above) = (layers.fuzz, layers.above);
         let mut choice = [0.0; LOBES];
@@ -262,10 +266,10 @@ impl Surface {
     fn reflectance(&self, cos: f32) -> Spectrum {
         let mut f = Spectrum::ZERO;
         if !self.metallic.is_zero() {
-            f += self.metal.at(cos) * self.metallic;
+            f += self.skin.metal(&self.metal, cos) * self.metallic;
         }
         if self.opaque > 0.0 {
-            f += self.boundary.at(cos) * self.opaque;
+            f += self.skin.boundary(&self.boundary, cos) * self.opaque;
         }
         f
     }
@@ -300,7 +304,7 @@ impl Surface {
                 reflects
             };
             let factor = self.body_tint(wo, crosses) * passes * self.transparent;
-            add(BODY, factor, self.body.eval(wo, wi));
+            add(BODY, factor, self.body.eval_under(self.skin.coat(), wo, wi));
         }
         if crosses || wo.z == 0.0 || wi.z == 0.0 {
             return out;
@@ -411,7 +415,7 @@ fn narrowest(a: f32) -> f32 {
     a.max(SMOOTH_BELOW * SMOOTH_BELOW)
 }
 
-impl Scatter for Surface {
+impl<S: Skin> Scatter for Surface<S> {
     #[inline]
     fn eval(&self, wo: Vec3, wi: Vec3, mode: Mode) -> ScatterEval {
         self.evaluate(wo, wi, &self.passage(wo), &self.passage(wi), mode)
@@ -455,7 +459,7 @@ impl Scatter for Surface {
                 Vec3::new(w.x, w.y, w.z * up)
             }
             _ if self.body.is_smooth() => return self.through(wo, u, &po),
-            _ => Vec3::from(self.body.sample(wo, u)?.wi),
+            _ => Vec3::from(self.body.sample_under(self.skin.coat(), wo, u)?.wi),
         };
         if wi.z == 0.0 {
             return None;
@@ -503,20 +507,21 @@ impl Scatter for Surface {
     }
 }
 
-impl Surface {
+impl<S: Skin> Surface<S> {
     /// A sample of the smooth body, as one of all lobes. From inside, the layers send back a part of what passes.
     fn through(&self, wo: Vec3, mut u: ScatterDraws, po: &Passage) -> Option<ScatterSample> {
         let out = self.layers.covers(wo) || self.layers.is_bare();
         let mut kept = 1.0;
         if !out {
             let last = 1.0 - f32::EPSILON;
-            let passes = self.body.sample(wo, ScatterDraws { lobe: last, ..u })?;
+            let u_last = ScatterDraws { lobe: last, ..u };
+            let passes = self.body.sample_under(self.skin.coat(), wo, u_last)?;
             if Vec3::from(passes.wi).z > 0.0 {
                 kept = self.passage(passes.wi.into()).layers.above;
                 let through = passes.forward * kept;
                 if u.lobe < 1.0 - through {
                     // The body's own reflection and what the layers send back, one as steep as the other.
-                    let weight = Spectrum::splat(self.transparent * (1.0 - through));
+                    let weight = (Spectrum::ONE - passes.weight * through) * self.transparent;
                     let mut s = self.mirror(wo, weight, po, BODY);
                     s.weight = s.weight / (1.0 - through);
                     s.forward *= 1.0 - through;
@@ -526,7 +531,7 @@ impl Surface {
                 u.lobe = last;
             }
         }
-        let mut s = self.body.sample(wo, u)?;
+        let mut s = self.body.sample_under(self.skin.coat(), wo, u)?;
         let wi = Vec3::from(s.wi);
         let pi = self.passage(wi);
         let crosses = wi.z * wo.z < 0.0;

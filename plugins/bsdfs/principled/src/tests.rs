@@ -1,5 +1,7 @@
 //! Tests of the plugin.
 
+mod films;
+
 use super::*;
 use resolvent_api::math::Frame;
 use resolvent_api::math::warp::around_z;
@@ -10,7 +12,7 @@ use resolvent_tests::Suite;
 use resolvent_tests::host::create;
 use resolvent_tests::scatter::{Measured, Symmetry, albedo, check_around, directions, examine};
 
-fn surface(params: &str) -> Surface {
+fn surface(params: &str) -> Look {
     let plugin: Principled = create(params).unwrap_or_else(|e| panic!("{params}: {e}"));
     plugin.closure(&SurfacePoint::default())
 }
@@ -104,7 +106,7 @@ fn samples_follow_their_density() {
 }
 
 /// Over a bumpy base, with its own normals: a rough coat, one on both sides, one over glass and under fuzz.
-fn coated(params: &str) -> Surface {
+fn coated(params: &str) -> Look {
     let plugin: Principled = create(params).unwrap_or_else(|e| panic!("{params}: {e}"));
     assert_eq!(plugin.traits(), bsdf_traits::OWN_NORMALS);
     // The surface's own normal leans away from the base's.
@@ -450,6 +452,8 @@ fn delta_lobes_backwards() {
         r#"{ "transmission": 1, "roughness": 0, "clearcoat": 1, "clearcoat_color": [1, 0.5, 0.2] }"#,
         r#"{ "transmission": 1, "roughness": 0, "thin": true, "clearcoat": 0.4 }"#,
         r#"{ "roughness": 0.4, "anisotropy": 0.5, "clearcoat": 1 }"#,
+        r#"{ "transmission": 0.6, "roughness": 0, "metallic": 0.3, "thin_film": 1, "thin_film_ior": 2 }"#,
+        r#"{ "transmission": 1, "roughness": 0, "clearcoat": 0.7, "thin_film": 0.5, "thin_film_ior": 1.8 }"#,
     ] {
         let k = surface(params);
         for wo in directions(40, 0xde1) {
@@ -591,6 +595,10 @@ fn nothing_is_ever_nan() {
         r#"{ "specular_color": 1000, "edge_color": 0, "metallic": 0.5, "base_color": 1 }"#,
         r#"{ "diffuse_roughness": 1, "clearcoat": 1, "clearcoat_color": 0, "clearcoat_darkening": 1, "base_color": 1 }"#,
         r#"{ "transmission": 1, "roughness": 0.5, "ior": 1, "clearcoat": 1, "sheen": 1 }"#,
+        r#"{ "transmission": 0.5, "roughness": 0.5, "thin_film": 1, "thin_film_ior": 5, "thin_film_thickness": 1e30 }"#,
+        r#"{ "transmission": 1, "roughness": 0, "ior": 1, "thin_film": 1 }"#,
+        r#"{ "metallic": 0.5, "base_color": 1, "f0": 1, "thin_film": 1, "thin_film_ior": 1, "roughness": 0.01 }"#,
+        r#"{ "metallic": 0.5, "base_color": 0, "f0": 0, "thin_film": 1, "edge_color": 0, "thin_film_thickness": 1e-30 }"#,
     ] {
         let k = surface(params);
         for (i, &wo) in all.iter().enumerate() {

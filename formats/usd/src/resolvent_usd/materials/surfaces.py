@@ -226,8 +226,11 @@ class _Names:
     """Of the coat's shape, with the values that make it even."""
     coat_rest: tuple[str, ...]
     coat_normal: str
-    film: str
-    film_rest: tuple[str, ...]
+    film: str | None
+    """Its weight; None where its thickness alone says whether there is one."""
+    film_thickness: tuple[str, float, float]
+    """With its default and its unit in nanometres."""
+    film_ior: tuple[str, float]
     tangents: dict[str, Any]
     thin: str
     opacity: str
@@ -245,7 +248,7 @@ STANDARD_SURFACE = _Names(
     sheen="sheen", sheen_color="sheen_color", sheen_roughness=("sheen_roughness", 0.3),
     coat="coat", coat_roughness=0.1, coat_ior=("coat_IOR", 1.5), coat_darkening=None,
     coat_uneven={"coat_anisotropy": 0.0, "coat_affect_color": 0.0, "coat_affect_roughness": 0.0},
-    coat_rest=("coat_rotation",), coat_normal="coat_normal", film="thin_film_thickness", film_rest=("thin_film_IOR",),
+    coat_rest=("coat_rotation",), coat_normal="coat_normal", film=None, film_thickness=("thin_film_thickness", 0.0, 1.0), film_ior=("thin_film_IOR", 1.5),
     tangents={"specular_rotation": 0.0, "tangent": _X},
     thin="thin_walled", opacity="opacity", emission="emission", normal="normal",
 )  # fmt: skip
@@ -260,7 +263,7 @@ OPEN_PBR = _Names(
     sheen="fuzz_weight", sheen_color="fuzz_color", sheen_roughness=("fuzz_roughness", 0.5),
     coat="coat_weight", coat_roughness=0.0, coat_ior=("coat_ior", 1.6), coat_darkening="coat_darkening",
     coat_uneven={"coat_roughness_anisotropy": 0.0},
-    coat_rest=(), coat_normal="geometry_coat_normal", film="thin_film_weight", film_rest=("thin_film_thickness", "thin_film_ior"),
+    coat_rest=(), coat_normal="geometry_coat_normal", film="thin_film_weight", film_thickness=("thin_film_thickness", 0.5, 1e3), film_ior=("thin_film_ior", 1.4),
     tangents={"geometry_tangent": _X, "geometry_coat_tangent": _X},
     # A luminance in nits; 1 shows as 1, as with lights.
     thin="geometry_thin_walled", opacity="geometry_opacity", emission="emission_luminance", normal="geometry_normal",
@@ -282,9 +285,8 @@ def _layered(s: _Surface, names: _Names) -> Look:
     _subsurface(s, names.subsurface, names.subsurface_rest)
     _sheen(s, names)
     _coat(s, names)
-    s.without({names.film: 0.0}, "the surface does not iridesce")
+    _film(s, names)
     s.without(names.tangents, "highlights stretch across x")
-    s.ignore(*names.film_rest)
     if bool(s.node.value(names.thin, False)):
         s.params["thin"] = True
     s.opacity = s.read(names.opacity, 1.0)
@@ -313,6 +315,18 @@ def _sheen(s: _Surface, names: _Names) -> None:
         return
     s.set("sheen_color", s.read(names.sheen_color, 1.0), 1.0, number=False)
     s.set("sheen_roughness", s.read(*names.sheen_roughness), 0.3)
+
+
+def _film(s: _Surface, names: _Names) -> None:
+    weight = Value(np.ones(3)) if names.film is None else s.read(names.film, 0.0)
+    name, default, unit = names.film_thickness
+    thickness = s.read(name, default).times(unit)
+    if weight.is_just(0.0) or thickness.is_just(0.0):
+        s.ignore(names.film_ior[0])
+        return
+    s.set("thin_film", weight, 0.0)
+    s.set("thin_film_thickness", thickness, 500.0, 0.0, 1e9)
+    s.set("thin_film_ior", _constant(s, *names.film_ior), 1.4, 1.0, 5.0)
 
 
 def _coat(s: _Surface, names: _Names) -> None:

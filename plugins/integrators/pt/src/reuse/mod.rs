@@ -110,6 +110,14 @@ pub fn render(kernel: &Kernel<'_>, edge: u32, tile: &Tile, out: &mut Output<'_>)
         // Blocks lie elsewhere for every sample, and go round at the tile's edges: none of their own shows.
         let place = derive(tile.seed ^ 0x626c_6f63_6b73, u64::from(sample));
         let shift = [place as u32, (place >> 32) as u32];
+        let corner = u64::from(tile.min[1]) << 32 | u64::from(tile.min[0]);
+        let together = Sampler::new(
+            tile.seed ^ 0x7469_6c65,
+            corner,
+            sample,
+            kernel.scene.lanes(),
+        );
+        let flight = together.flight(0, Spectrum::ONE);
         for b in 0..across[0] * across[1] {
             let at = [b % across[0], b / across[0]];
             let span = |k: usize| {
@@ -124,7 +132,7 @@ pub fn render(kernel: &Kernel<'_>, edge: u32, tile: &Tile, out: &mut Output<'_>)
                         block.members.push(Member::new());
                     }
                     let m = &mut block.members[count];
-                    kernel.set_out(tile, [x, y], sample, m, &mut block.scratch)?;
+                    kernel.set_out(tile, [x, y], sample, &flight, m, &mut block.scratch)?;
                     count += 1;
                 }
             }

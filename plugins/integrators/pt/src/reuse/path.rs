@@ -4,7 +4,7 @@ use super::{Arrival, Member};
 use crate::kernel::{Found, Kernel, Walk};
 use resolvent_api::abi::{PixelSample, Tile, scene_traits};
 use resolvent_api::integrator::Outcome;
-use resolvent_api::operator::{Mode, Scatter, lobes};
+use resolvent_api::operator::{FlightDraws, Mode, Scatter, lobes};
 use resolvent_api::vertex::{Edge, vertex_flags};
 use resolvent_api::{Spectrum, Transport, Vec3, Vertex, VertexKind};
 use resolvent_pathspace::orders::Together;
@@ -22,6 +22,7 @@ impl Kernel<'_> {
         tile: &Tile,
         pixel: [u32; 2],
         sample: u32,
+        flight: &FlightDraws,
         m: &mut Member,
         scratch: &mut [Vertex; 2],
     ) -> Outcome<()> {
@@ -36,8 +37,7 @@ impl Kernel<'_> {
             return Ok(());
         };
         let mut edge = Edge::default();
-        let flight = sampler.flight(0, Spectrum::ONE);
-        let alive = scene.emerge(&ray, &flight, &mut edge, &mut m.first)?;
+        let alive = scene.emerge(&ray, flight, &mut edge, &mut m.first)?;
         let y = &m.first;
         features::fill(
             &mut m.sample,

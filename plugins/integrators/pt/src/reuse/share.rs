@@ -3,12 +3,19 @@
 use super::Member;
 use super::path::clear;
 use crate::kernel::Kernel;
+use resolvent_api::abi::scene_traits;
 use resolvent_api::integrator::Outcome;
 use resolvent_api::operator::Mode;
 use resolvent_api::vertex::{LightSample, vertex_flags};
-use resolvent_api::{Spectrum, Transport, Vec3, VertexKind};
+use resolvent_api::{Spectrum, Transport, Vec3, Vertex, VertexKind};
 use resolvent_pathspace::bidirectional::target;
+use resolvent_pathspace::sampler::Sampler;
 use resolvent_pathspace::{roulette, scatter};
+
+/// Chains of null collisions by which ρ is estimated in media where it is random: their mean. A flight's own is one of them, any of
+/// them alike, so that weights stay exact. On `bench/cloud_sun` at 2048 × 1536 pixels, the squared error times CPU time with two is
+/// 0.87 of that with one, with four 0.82; but in thin smoke, where sharing gains nothing, four cost twice what two do.
+const CHAINS: u64 = 2;
 
 /// How first vertex `member` sees a second vertex: K at both and the geometry term between them, for the light chosen there and
 /// for the direction chosen there.
@@ -110,15 +117,9 @@ impl Kernel<'_> {
             if !(ey.forward * geometry > 0.0) {
                 continue;
             }
-            let clear = if k == i {
-                m.clear
-            } else {
-                let u = m.sampler.unrelated(0x7368_6172_6500_0000 + k as u64);
-                match scene.connect(y, &target(&x, w, d2.sqrt() as f32), &u)? {
-                    Some(edge) => clear(&edge),
-                    None => continue,
-                }
-            };
+            let to = target(&x, w, d2.sqrt() as f32);
+            let own = (k == i).then_some(m.clear);
+            let clear = self.clear(y, &to, own, &m.sampler, k)?;
             let p = ey.forward * geometry * clear;
             if !(p > 0.0 && p.is_finite()) {
                 continue;
@@ -148,5 +149,30 @@ impl Kernel<'_> {
             ways.push(way);
         }
         Ok(found)
+    }
+
+    /// ρ of the edge from the first vertex of member `k` to `to`, of which `own` is that of the flight, if one was made.
+    fn clear(
+        &self,
+        y: &Vertex,
+        to: &LightSample,
+        own: Option<f32>,
+        sampler: &Sampler,
+        k: usize,
+    ) -> Outcome<f32> {
+        let tracked = self.scene.has(scene_traits::TRACKED_MEDIA);
+        let chains = if tracked { CHAINS } else { 1 };
+        let mut sum = own.unwrap_or(0.0);
+        for chain in u64::from(own.is_some())..chains {
+            let u = sampler.unrelated(0x7368_6172_6500_0000 + CHAINS * k as u64 + chain);
+            if let Some(edge) = self.scene.connect(y, to, &u)? {
+                // Where no medium is met, no chain differs.
+                if edge.media == 0 {
+                    return Ok(1.0);
+                }
+                sum += clear(&edge);
+            }
+        }
+        Ok(sum / chains as f32)
     }
 }
