@@ -25,11 +25,25 @@ pub struct Reflector {
 impl Reflector {
     /// From the widths, both above 0, and the facets' mean reflectance for diffuse light, 2 ∫ F(μ) μ dμ. `lanes` are in use.
     pub fn new(alpha: [f32; 2], f_average: Spectrum, lanes: u32) -> Self {
+        Self::of_parts(alpha, [(Spectrum::ONE, f_average)], lanes)
+    }
+
+    /// The same where parts of the surface have facets of different kinds: the share of each, and its mean reflectance. F_ms is not
+    /// linear in F, and light that met a facet of one kind meets more of that kind.
+    pub fn of_parts<const N: usize>(
+        alpha: [f32; 2],
+        parts: [(Spectrum, Spectrum); N],
+        lanes: u32,
+    ) -> Self {
         let ggx = Ggx { alpha };
         let width = Width::of(&ggx);
-        let multiple = Self::multiple(&width, f_average);
+        let (mut once, mut multiple) = (Spectrum::ZERO, Spectrum::ZERO);
+        for (share, average) in parts {
+            once += average * share;
+            multiple += Self::multiple(&width, average) * share;
+        }
         let lost = (1.0 - width.single_average()).max(1e-6);
-        let f = f_average.mean(lanes).max(1e-6);
+        let f = once.mean(lanes).max(1e-6);
         Self {
             ggx,
             width,

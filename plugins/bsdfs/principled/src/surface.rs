@@ -92,7 +92,6 @@ impl<S: Skin> Surface<S> {
         let metal = Tinted::new(p.base_color, p.edge_color);
         let metallic = darker * p.metallic;
         let widths = alpha(p.roughness, p.anisotropy).map(narrowest);
-        let rough = |average| Reflector::new(widths, average, lanes);
         let is_rough = p.roughness >= SMOOTH_BELOW;
         let skin = S::new(p, outside, &metal);
         // Of a part that is not there a film need not be asked.
@@ -105,7 +104,10 @@ impl<S: Skin> Surface<S> {
             true => skin.boundary_average(&boundary),
             false => Spectrum::ZERO,
         };
-        let average = metal_average * metallic + boundary_average * opaque;
+        let parts = [
+            (metallic, metal_average),
+            (Spectrum::splat(opaque), boundary_average),
+        ];
         let tint = p.transmission_color.unwrap_or(p.base_color);
         let outer = p.specular_color.map(|c| c.min(1.0)) * p.specular;
         let body_widths = if is_rough { widths } else { [0.0; 2] };
@@ -124,7 +126,7 @@ impl<S: Skin> Surface<S> {
             metal,
             metallic,
             opaque,
-            rough: is_rough.then(|| rough(average)),
+            rough: is_rough.then(|| Reflector::of_parts(widths, parts, lanes)),
             multiple: Spectrum::ZERO,
             diffuse: Spectrum::ZERO,
             rough_diffuse: Diffuse::new(p.diffuse_roughness, p.base_color),

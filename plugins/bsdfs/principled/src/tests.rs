@@ -218,6 +218,8 @@ fn a_white_base_loses_nothing() {
         r#""metallic": 0, "specular": 0.3"#,
         r#""metallic": 0, "specular": 0"#,
         r#""metallic": 1"#,
+        r#""metallic": 0.5"#,
+        r#""metallic": 0.4, "transmission": 0.5"#,
         r#""transmission": 1, "ior": 1.4"#,
         r#""transmission": 0.5"#,
         r#""transmission": 1, "thin": true"#,
