@@ -76,8 +76,15 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
     }
 }
 
+/// What is to be rendered, with no options that are for other inputs.
+pub fn of(a: &Render) -> Outcome<Kind> {
+    let kind = kind(&a.input)?;
+    refuse(a, kind)?;
+    Ok(kind)
+}
+
 /// Refuses options that are for other inputs.
-pub fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
+fn refuse(a: &Render, kind: Kind) -> Outcome<()> {
     if let (Kind::Scene | Kind::Usd, Some(option)) = (kind, a.guesses.given()) {
         let what = if kind == Kind::Usd {
             "USD stage"

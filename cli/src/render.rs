@@ -35,8 +35,7 @@ pub fn run(a: &Render) -> Outcome {
         Message::Warning(text) => console::warning(text),
         Message::Info(text) => console::info(text),
     });
-    let kind = crate::input::kind(&a.input)?;
-    crate::input::refuse(a, kind)?;
+    let kind = crate::input::of(a)?;
     match &a.stage.frames {
         Some(frames) => sequence::run(a, frames, |a| one(a, kind)),
         None => one(a, kind),

@@ -36,8 +36,7 @@ pub fn run(a: &Render) -> Outcome {
     console::set_quiet(a.quiet);
     interrupt::install(On::Tell);
     // What no change of a file can mend ends it at once.
-    let kind = crate::input::kind(&a.input)?;
-    crate::input::refuse(a, kind)?;
+    crate::input::of(a)?;
     let targets = output::targets(&a.output, Some(&a.input))?;
     if let Some(file) = &a.stats {
         output::check_writable(file)?;

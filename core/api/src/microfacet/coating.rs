@@ -62,29 +62,18 @@ impl Coating for Film {
     type Value = Spectrum;
     const IS_BARE: bool = false;
 
-    /// From within, what is not reflected totally meets the stack in the opposite order, which reflects as much (Born & Wolf, §1.6.3).
     #[inline]
     fn reflects(&self, cos: f32, eta: f32, inside: bool) -> (Spectrum, f32) {
         let (bare, cos_t) = fresnel::dielectric(cos, eta);
         if cos_t == 0.0 {
             return (Spectrum::splat(bare), 0.0);
         }
-        let shares = if inside {
-            self.dielectric(cos_t, 1.0 / eta)
-        } else {
-            self.dielectric(cos, eta)
-        };
-        (shares, cos_t)
+        (self.either_way(cos, cos_t, eta, inside), cos_t)
     }
 
     #[inline]
     fn passes(&self, cos: f32, cos_t: f32, eta: f32, inside: bool) -> Spectrum {
-        let shares = if inside {
-            self.dielectric(cos_t, 1.0 / eta)
-        } else {
-            self.dielectric(cos, eta)
-        };
-        Spectrum::ONE - shares
+        Spectrum::ONE - self.either_way(cos, cos_t, eta, inside)
     }
 
     #[inline(always)]
@@ -95,5 +84,18 @@ impl Coating for Film {
     #[inline(always)]
     fn relative(share: Spectrum, p: f32) -> Spectrum {
         share / p.max(1e-12)
+    }
+}
+
+impl Film {
+    /// Reflectance where refraction leads from `cos` to `cos_t`. From within, what is not reflected totally meets the stack in the
+    /// opposite order, which reflects as much (Born & Wolf, §1.6.3).
+    #[inline(always)]
+    fn either_way(&self, cos: f32, cos_t: f32, eta: f32, inside: bool) -> Spectrum {
+        if inside {
+            self.dielectric(cos_t, 1.0 / eta)
+        } else {
+            self.dielectric(cos, eta)
+        }
     }
 }
