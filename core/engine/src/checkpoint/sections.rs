@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 /// First bytes of a checkpoint.
 pub const MAGIC: [u8; 8] = *b"RSLVCKPT";
 /// Version of the format: any change of what sections hold is another one.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 const NAME: usize = 32;
 
 /// Writes a checkpoint into memory.

@@ -4,8 +4,9 @@ use super::coverage::Coverage;
 use super::fixed::{Squares, add, float};
 use std::ops::Range;
 
-/// Edge of a tile, pixels.
-pub const TILE: u32 = 16;
+/// Edge of a tile, pixels. `--error` keeps the error of every tile below its goal, and the smaller they are, the closer samples follow
+/// the noise; smaller ones still would leave too few pixels to judge it by.
+pub const TILE: u32 = 8;
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

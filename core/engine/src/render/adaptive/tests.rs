@@ -9,13 +9,13 @@ use resolvent_api::abi::PixelSample;
 use resolvent_api::rng::{Stream, mix};
 use serde_json::json;
 
-/// Two tiles, of 16 pixels and of 2.
+/// Tiles of 8, 8 and 2 pixels.
 const WINDOW: [u32; 4] = [0, 0, 18, 1];
-/// Two tiles, of 256 pixels and of 32.
+/// Two rows of tiles of 64, 64 and 16 pixels.
 const TALL: [u32; 4] = [0, 0, 18, 16];
 const BOX: Filter = Filter::Box(0.5);
 
-/// Rare bright light on the first tile, calm light on the second; of the halves' seeds.
+/// Rare bright light on the first tiles, calm light on the others; of the halves' seeds.
 fn buffer(seeds: [u64; 2], rect: Rect, samples: Range<u32>) -> Buffer {
     let mut b = Buffer::new(rect.min, rect.max, samples.clone(), false);
     let seed = seeds[nets::number(samples.start) as usize % 2];
