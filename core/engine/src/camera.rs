@@ -1,9 +1,9 @@
 //! Cameras: pinhole, thin lens and parallel rays.
 
 use crate::filter::Filter;
-use resolvent_api::Spectrum;
 use resolvent_api::math::{Affine, DVec3, Vec3, warp};
 use resolvent_api::vertex::{CameraRay, LightSample, NONE, SensorSample, Vertex, vertex_flags};
+use resolvent_api::{Aabb, Spectrum};
 use resolvent_scene as describe;
 use resolvent_scene::Projection;
 
@@ -23,8 +23,6 @@ pub struct Camera {
     focus_distance: f32,
     exposure: f32,
     filter: Filter,
-    /// The interior media the camera is in.
-    pub inside: u64,
 }
 
 impl Camera {
@@ -53,13 +51,25 @@ impl Camera {
             focus_distance: c.focus_distance as f32,
             exposure: c.exposure.exp2() as f32,
             filter: Filter::new(film.filter),
-            inside: 0,
         }
     }
 
-    /// Centre of the lens.
-    pub fn origin(&self) -> Vec3 {
-        self.origin
+    /// A box around all points that rays start from: the centre of the lens, all of the lens, or as much of a plane as the film
+    /// and the filter beyond its edges see.
+    pub fn starts(&self) -> Aabb {
+        let [right, up, _] = self.axes;
+        let around = |centre: Vec3, reach: Vec3| Aabb::new(centre - reach, centre + reach);
+        if !self.parallel {
+            return around(self.origin, (right.abs() + up.abs()) * self.lens_radius);
+        }
+        let beyond = self.filter.radius();
+        let [x0, x1] =
+            [-beyond, self.size[0] + beyond].map(|x| (x - self.centre[0]) * self.scale[0]);
+        let [y0, y1] =
+            [-beyond, self.size[1] + beyond].map(|y| (self.centre[1] - y) * self.scale[1]);
+        let middle = self.origin + right * (0.5 * (x0 + x1)) + up * (0.5 * (y0 + y1));
+        let reach = right.abs() * (0.5 * (x1 - x0)) + up.abs() * (0.5 * (y0 - y1));
+        around(middle, reach)
     }
 
     /// The factor on the picture.
@@ -72,7 +82,7 @@ impl Camera {
         &self.filter
     }
 
-    /// The ray of a sample of `pixel` (column, row): `film` is what the filter turns into a position around the pixel's
+    /// The ray of a sample of `pixel` (column, row), as if nothing filled the place that it starts from: `film` is what the filter turns into a position around the pixel's
     /// centre, `lens` chooses a point on the lens.
     #[inline]
     pub fn ray(&self, pixel: [u32; 2], film: [f32; 2], lens: [f32; 2]) -> CameraRay {
@@ -80,7 +90,7 @@ impl Camera {
         self.film_ray([at(0), at(1)], lens)
     }
 
-    /// The ray through the position `film` (pixels) and the point on the lens chosen by `lens`.
+    /// The same through the position `film` (pixels) and the point on the lens chosen by `lens`.
     #[inline]
     pub fn film_ray(&self, film: [f32; 2], lens: [f32; 2]) -> CameraRay {
         let x = (film[0] - self.centre[0]) * self.scale[0];
@@ -92,7 +102,7 @@ impl Camera {
                 o: (o + right * x + up * y).into(),
                 d: forward.into(),
                 weight: 1.0,
-                inside: self.inside,
+                inside: 0,
                 density: self.density(1.0),
                 flags: vertex_flags::PARALLEL,
             };
@@ -108,7 +118,7 @@ impl Camera {
             o: o.into(),
             d: d.into(),
             weight: 1.0,
-            inside: self.inside,
+            inside: 0,
             density: self.density(forward.dot(d)),
             flags: 0,
         }

@@ -14,6 +14,7 @@ mod judge;
 mod report;
 mod scenes;
 
+mod boundaries;
 mod instances;
 mod lights;
 mod limits;

@@ -6,11 +6,12 @@ use super::instances::{Copies, Groups, emits};
 use super::interiors::{Collected, Interior, Interiors};
 use super::lights::{area, distant_light, emission_texture, shaping, spectrum, sun_sky};
 use super::shapes::{Wide, affine};
+use super::starts::Starts;
 use super::{Material, NormalMap, PlacedMedium, Surface};
 use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::geometry::{Accel, Geometry, Shape};
-use crate::light::{Area, Bound, BoundingSphere, Light, Lights};
+use crate::light::{Area, BoundingSphere, Light, Lights};
 use crate::plugin::{ForeignBsdf, ForeignMedium, Registry, warn};
 use crate::texture::{ReadImage, Textures};
 use glam::DVec3;
@@ -63,8 +64,7 @@ pub struct Scene {
     pub lanes: u32,
     /// The point of the world that is the origin of everything here.
     pub centre: DVec3,
-    /// See [`Scene::starts`].
-    pub(crate) starts: Vec<Option<u64>>,
+    pub(super) starts: Starts,
     /// The images that textures in use were read from.
     pub textures: Vec<ReadImage>,
     /// What building took.
@@ -351,7 +351,7 @@ impl Scene {
             traits,
             lanes,
             centre,
-            starts: Vec::new(),
+            starts: Starts::default(),
             textures: textures.read(),
             preparation: Preparation {
                 media_seconds,
@@ -359,42 +359,9 @@ impl Scene {
                 total_seconds: 0.0,
             },
         };
-        built.camera.inside = built.interiors_at(built.camera.origin());
-        built.starts = built.starts();
+        built.starts = Starts::new(&built);
         built.preparation.total_seconds = start.elapsed().as_secs_f64();
         Ok(built)
-    }
-
-    /// The interiors that walks from each light start in, where that is the same all over it: lights without extent, and those
-    /// clear of everything that is filled.
-    fn starts(&self) -> Vec<Option<u64>> {
-        let mut filled = Aabb::EMPTY;
-        if let Some(accel) = &self.accel {
-            let shapes = accel.geometry().shapes.iter().zip(&self.surfaces);
-            for (shape, _) in shapes.filter(|(_, s)| s.interior.is_some()) {
-                filled = shape_bounds(shape, filled);
-            }
-            let copied = self.copies.surfaces().iter();
-            if let Some((lo, hi)) = accel.instance_bounds()
-                && copied.map(|s| s.interior).any(|i| i.is_some())
-            {
-                filled = filled.including(lo).including(hi);
-            }
-        }
-        // Wide enough for rays that were moved off the light.
-        let pad = 1e-4 * filled.extent();
-        let (lo, hi) = (Vec3::from(filled.min) - pad, Vec3::from(filled.max) + pad);
-        let start = |light: &Light| match light {
-            _ if filled.is_empty() => Some(0),
-            Light::Point { position, .. } => Some(self.interiors_at(*position)),
-            Light::Spot(spot) => Some(self.interiors_at(spot.position)),
-            _ => {
-                let at = Bound::of(light, self.lanes)?;
-                let clear = at.hi.cmplt(lo).any() || at.lo.cmpgt(hi).any();
-                clear.then_some(0)
-            }
-        };
-        self.lights.all.iter().map(start).collect()
     }
 
     /// How many primitives can be hit, 0 without a hierarchy.
@@ -511,7 +478,7 @@ fn centre(scene: &describe::Scene, shapes: &[Wide], groups: &Groups, camera: DVe
     }
 }
 
-fn shape_bounds(shape: &Shape, bounds: Aabb) -> Aabb {
+pub(super) fn shape_bounds(shape: &Shape, bounds: Aabb) -> Aabb {
     match shape {
         Shape::Sphere(s) => {
             let r = Vec3::splat(s.radius);

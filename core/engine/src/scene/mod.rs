@@ -9,6 +9,7 @@ mod lights;
 mod media;
 mod normal_map;
 mod shapes;
+mod starts;
 mod transport;
 mod view;
 

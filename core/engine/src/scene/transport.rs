@@ -184,7 +184,7 @@ impl View<'_> {
         } else {
             edge.length = 0.0;
         }
-        let mut u = *u;
+        let (mut u, prior) = (*u, u.prior);
         for boundary in 0..MAX_BOUNDARIES {
             let hit = if SURFACES { self.closest(o, d) } else { None };
             let t1 = hit.as_ref().map_or(f32::INFINITY, |(h, _)| h.t);
@@ -227,7 +227,8 @@ impl View<'_> {
             u.key = derive(u.key, 0x626f_756e ^ u64::from(boundary));
             let mut fresh = resolvent_api::rng::Stream::new(u.key ^ 1);
             (u.tau, u.event) = (fresh.uniform(), fresh.uniform());
-            u.prior *= edge.track;
+            // `track` is of all that lies in front already.
+            u.prior = prior * edge.track;
         }
         Err(self.fail(format!(
             "a ray passed {MAX_BOUNDARIES} boundaries without end at {o:?}"

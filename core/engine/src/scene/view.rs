@@ -199,7 +199,10 @@ unsafe extern "C" fn camera_ray(
     out: *mut CameraRay,
 ) -> Status {
     // SAFETY: integrators pass on the table's ctx and valid pointers; the same below.
-    unsafe { *out = view(ctx).scene.camera.ray(*pixel, *film, *lens) };
+    unsafe {
+        let scene = view(ctx).scene;
+        *out = scene.from_camera(scene.camera.ray(*pixel, *film, *lens));
+    }
     Status::OK
 }
 
@@ -314,7 +317,10 @@ unsafe extern "C" fn film_ray(
     out: *mut CameraRay,
 ) -> Status {
     // SAFETY: as above.
-    unsafe { *out = view(ctx).scene.camera.film_ray(*film, *lens) };
+    unsafe {
+        let scene = view(ctx).scene;
+        *out = scene.from_camera(scene.camera.film_ray(*film, *lens));
+    }
     Status::OK
 }
 
@@ -352,8 +358,8 @@ unsafe extern "C" fn emit(
         Some(mut ray) => {
             // Lights at infinity stand outside everything.
             if !vertex.is_infinite() {
-                let start = scene.starts.get(vertex.light as usize).copied().flatten();
-                ray.inside = start.unwrap_or_else(|| scene.interiors_at(ray.o.into()));
+                ray.inside = scene.light_start(vertex.light, ray.o.into());
+                vertex.inside = ray.inside;
             }
             // SAFETY: as above.
             unsafe { *out = ray };
