@@ -4,7 +4,7 @@ use super::{Goal, Keep, Progress, Settings, piece};
 use crate::checkpoint::State;
 use crate::film::Rect;
 use crate::plugin::ForeignIntegrator;
-use crate::scene::Scene;
+use crate::scene::{Scene, Until};
 use resolvent_api::abi::Tile;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -25,6 +25,10 @@ pub enum Into {
         second: bool,
     },
 }
+
+/// How far beyond its end of time a render may still finish what it has begun, as a share of that time, and seconds.
+const PATIENCE: f64 = 0.1;
+const PATIENCE_SECONDS: f64 = 1.0;
 
 /// What is shared.
 pub struct Job<'j> {
@@ -126,14 +130,43 @@ impl<'j> Job<'j> {
             features: u32::from(s.features),
             margin: (self.scene.camera.filter().radius() - 0.5).max(0.0),
         };
-        let done = piece::render(self.scene, self.integrator, &tile, s.orders)
-            .and_then(|finished| self.add(finished, index, into));
-        if let Err(why) = done {
-            self.fail(why);
-            return false;
+        let done = piece::render(self.scene, self.integrator, &tile, s.orders, self.until());
+        match done {
+            Ok(Some(finished)) => {
+                if let Err(why) = self.add(finished, index, into) {
+                    self.fail(why);
+                    return false;
+                }
+            }
+            Ok(None) => {
+                let out_of_time = !self.is_stopped();
+                self.out_of_time.fetch_or(out_of_time, Ordering::Relaxed);
+                return false;
+            }
+            Err(why) => {
+                self.fail(why);
+                return false;
+            }
         }
         self.keep();
         true
+    }
+
+    /// What ends a piece that has begun: the render is stopped, or a plugin broke, or time is over by so much that it is not worth
+    /// waiting for.
+    fn until(&self) -> Until<'_> {
+        let limit = match self.settings.goal {
+            Goal::Time(limit) => Some(limit.as_secs_f64()),
+            _ => None,
+        };
+        let left = limit.map(|l| (1.0 + PATIENCE) * l + PATIENCE_SECONDS - self.before);
+        let deadline = left
+            .and_then(|s| Duration::try_from_secs_f64(s.max(0.0)).ok())
+            .and_then(|s| self.start.checked_add(s));
+        Until {
+            flags: [self.stop, &self.broken],
+            deadline,
+        }
     }
 
     /// Ends the render with an error.

@@ -2,7 +2,7 @@
 
 use crate::film::{Buffer, UNFIT};
 use crate::plugin::ForeignIntegrator;
-use crate::scene::{Counters, Scene, View};
+use crate::scene::{Counters, Scene, Until, View};
 use resolvent_api::Spectrum;
 use resolvent_api::abi::{OutputTable, PixelSample, Status, Tile};
 use std::ffi::c_void;
@@ -13,7 +13,7 @@ pub struct Finished {
     pub counters: Counters,
 }
 
-/// Renders a piece of work.
+/// Renders a piece of work; `None` if it was stopped before it was done.
 ///
 /// # Errors
 /// If a plugin breaks, or the integrator does not give what it was asked for.
@@ -22,8 +22,9 @@ pub fn render(
     integrator: &ForeignIntegrator,
     tile: &Tile,
     orders: usize,
-) -> Result<Finished, String> {
-    let view = View::new(scene);
+    until: Until<'_>,
+) -> Result<Option<Finished>, String> {
+    let view = View::new(scene, until);
     let samples = tile.sample_begin..tile.sample_end;
     let wanted = samples.len();
     let mut sink = Sink {
@@ -41,6 +42,9 @@ pub fn render(
         splat_order,
     };
     let result = integrator.render(&view.table(), tile, &out);
+    if view.is_stopped() {
+        return Ok(None);
+    }
     if let Some(why) = view.take_error().or_else(|| {
         sink.error
             .take()
@@ -57,10 +61,10 @@ pub fn render(
             "{title} added {n} samples to pixel ({x}, {y}) instead of {wanted}"
         ));
     }
-    Ok(Finished {
+    Ok(Some(Finished {
         buffer: sink.buffer,
         counters: view.counters(),
-    })
+    }))
 }
 
 struct Sink {

@@ -35,7 +35,8 @@ pub fn run(job: &Job) -> bool {
         if job.is_out_of_time() {
             return true;
         }
-        if job.is_stopped() {
+        let all = finished.into_inner() == pieces.len() && end == range.end;
+        if job.is_stopped() && !all {
             return false;
         }
         begin = end;

@@ -11,10 +11,12 @@ mod normal_map;
 mod shapes;
 mod starts;
 mod transport;
+mod until;
 mod view;
 
 pub use build::{Preparation, Scene};
 pub use normal_map::NormalMap;
+pub use until::Until;
 pub use view::{Counters, View};
 
 use crate::plugin::{ForeignBsdf, ForeignMedium};

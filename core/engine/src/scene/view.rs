@@ -1,6 +1,6 @@
 //! The scene as an integrator sees it: the table of functions, counters, and the first error.
 
-use super::{Scene, media};
+use super::{Scene, Until, media};
 use crate::light::Reference;
 use crate::plugin::{ForeignMedium, pending_failure};
 use bytemuck::{Pod, Zeroable};
@@ -67,16 +67,40 @@ pub struct View<'s> {
     pub scene: &'s Scene,
     pub(crate) counters: Cell<Counters>,
     error: RefCell<Option<String>>,
+    until: Until<'s>,
+    /// Rays that integrators have asked for.
+    calls: Cell<u32>,
+    stopped: Cell<bool>,
 }
 
 impl<'s> View<'s> {
-    /// A fresh view.
-    pub fn new(scene: &'s Scene) -> Self {
+    /// A fresh view for work that may be stopped.
+    pub fn new(scene: &'s Scene, until: Until<'s>) -> Self {
         Self {
             scene,
             counters: Cell::default(),
             error: RefCell::new(None),
+            until,
+            calls: Cell::new(0),
+            stopped: Cell::new(false),
         }
+    }
+
+    /// True if an integrator has been told to end, since the work is to stop.
+    pub fn is_stopped(&self) -> bool {
+        self.stopped.get()
+    }
+
+    /// Counts a ray; an error if the work is to stop.
+    #[inline(always)]
+    fn go_on(&self) -> Result<(), Status> {
+        let calls = self.calls.get().wrapping_add(1);
+        self.calls.set(calls);
+        if self.until.is_due(calls) {
+            self.stopped.set(true);
+            return Err(Status::ERROR);
+        }
+        Ok(())
     }
 
     /// What was counted.
@@ -215,6 +239,9 @@ unsafe extern "C" fn emerge<const SURFACES: bool, const MEDIA: u8>(
 ) -> Status {
     // SAFETY: as above.
     let (v, ray, u, edge, next) = unsafe { (view(ctx), &*ray, &*u, &mut *edge, &mut *next) };
+    if let Err(status) = v.go_on() {
+        return status;
+    }
     v.travel::<SURFACES, MEDIA>(ray.o.into(), ray.d.into(), ray.inside, u, edge, next)
 }
 
@@ -237,6 +264,9 @@ unsafe extern "C" fn propagate<const SURFACES: bool, const MEDIA: u8>(
             &mut *next,
         )
     };
+    if let Err(status) = v.go_on() {
+        return status;
+    }
     let (o, inside) = v.scene.leave(from, wi);
     v.travel::<SURFACES, MEDIA>(o, wi, inside, u, edge, next)
 }
@@ -307,6 +337,9 @@ unsafe extern "C" fn connect<const SURFACES: bool, const MEDIA: u8>(
 ) -> Status {
     // SAFETY: as above.
     let (v, from, to, u, edge) = unsafe { (view(ctx), &*from, &*to, &*u, &mut *edge) };
+    if let Err(status) = v.go_on() {
+        return status;
+    }
     v.join::<SURFACES, MEDIA>(from, to, u, edge)
 }
 

@@ -11,6 +11,9 @@ use resolvent_api::operator::{Mode, ScatterSample};
 use resolvent_api::vertex::{CameraRay, Edge, vertex_flags};
 use resolvent_api::{SceneView, Spectrum, Transport, Vec3, Vertex, VertexKind};
 
+/// Vertices of the longest walk that is kept. What goes on longer, in media that hardly absorb, would fill any memory.
+const MOST_VERTICES: usize = 1 << 17;
+
 /// A vertex of a subpath.
 #[derive(Clone, Copy)]
 pub struct Node {
@@ -204,6 +207,13 @@ impl Subpath {
         for bounce in 0u32.. {
             if self.len >= limit {
                 break;
+            }
+            if self.len == MOST_VERTICES {
+                let last = &self.nodes[self.len - 1].vertex;
+                return Err(scene.fault(
+                    last,
+                    "a walk has scattered 131071 times, and no longer one is kept whole: set `max_depth`, or use the integrator pt",
+                ));
             }
             let at = self.push();
             let (before, rest) = self.nodes.split_at_mut(at);
