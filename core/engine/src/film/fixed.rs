@@ -2,8 +2,10 @@
 
 /// Fractional bits of sums.
 const FRACTION: i32 = 64;
-/// Largest magnitude a single value may have; beyond, it is rejected like an infinity. Leaves room for 2²³ samples.
+/// Largest magnitude a single value may have; beyond, it is rejected like an infinity. Leaves room for [`MOST_SAMPLES`].
 const LARGEST: f32 = 1e12;
+/// Samples that a pixel's sums have room for. All samples come before the one of this number.
+pub const MOST_SAMPLES: u32 = 1 << 23;
 
 /// What is said of values that can't be added, after them.
 pub const UNFIT: &str = "which is not finite or more than a film can hold";

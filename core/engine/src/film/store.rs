@@ -1,7 +1,7 @@
 //! Films in checkpoints.
 
 use super::coverage::Coverage;
-use super::fixed::Squares;
+use super::fixed::{MOST_SAMPLES, Squares};
 use super::tile::{self, Part};
 use super::{FeatureSums, Film, orders, splat};
 use crate::checkpoint::sections::{Fields, Reader, Writer};
@@ -13,8 +13,6 @@ const PIXEL: usize = 64 + SQUARES;
 const FEATURES: usize = 120;
 const SPLATS: usize = 48 + SQUARES;
 const SQUARES: usize = 72;
-/// Samples that there can be: a checkpoint that says it has more is damaged.
-const MOST_SAMPLES: u32 = 1 << 31;
 
 fn put(out: &mut Vec<u8>, values: &[i128]) {
     for v in values {
