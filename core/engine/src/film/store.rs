@@ -150,8 +150,8 @@ impl Film {
             let mut coverage = Coverage::default();
             for _ in 0..f.u32()? {
                 let (begin, end) = (f.u32()?, f.u32()?);
-                let fits = begin < end && end <= MOST_SAMPLES;
-                if !fits || coverage.insert(begin..end).is_err() {
+                // As they are written: rising, with gaps between them.
+                if end > MOST_SAMPLES || !coverage.push(begin..end) {
                     return Err(format!("tile {i} cannot have samples {begin}..{end}"));
                 }
             }
@@ -169,10 +169,13 @@ impl Film {
     fn read_parts(&mut self, mut f: Fields) -> Result<(), String> {
         let mut wanted = BTreeSet::new();
         for (i, t) in self.tiles.iter().enumerate() {
+            let mut last = None;
             for r in t.coverage().ranges() {
-                let ends = [r.start, r.end - 1].map(nets::around);
-                for net in ends {
-                    if !t.coverage().missing(net.clone()).is_empty() {
+                for net in [r.start, r.end - 1].map(nets::around) {
+                    // A net is looked at once, however many ranges cut it.
+                    if last.replace(net.start) != Some(net.start)
+                        && !t.coverage().missing(net.clone()).is_empty()
+                    {
                         wanted.insert((i, net.start));
                     }
                 }

@@ -1,6 +1,7 @@
 //! Tests of the film.
 
 use super::*;
+use crate::checkpoint::sections::Writer;
 use crate::checkpoint::{Checkpoint, State};
 use resolvent_api::Spectrum;
 use resolvent_api::abi::PixelSample;
@@ -177,4 +178,49 @@ fn checkpoints_bring_everything_back() {
         );
         assert!(read.state.to_bytes(&read.identity, &read.about) == written);
     }
+}
+
+/// A checkpoint's samples rise and leave gaps, as they are written. Files with very many ranges take no longer than they are long.
+#[test]
+fn ranges_are_read_in_order() {
+    const COUNT: u32 = 300_000;
+    let read = |tiles: &[u8], parts: &[u8]| {
+        let mut out = Writer::new(br#"{"window": [0, 0, 1, 1], "halves": 1, "counters": []}"#);
+        out.section("pixels", |out| out.resize(out.len() + 136, 0));
+        out.section("tiles", |out| out.extend_from_slice(tiles));
+        out.section("parts", |out| out.extend_from_slice(parts));
+        Checkpoint::from_bytes(&out.finish()).err().unwrap()
+    };
+    let tiles = |ranges: &mut dyn Iterator<Item = Range<u32>>| {
+        let (mut bytes, mut count, mut samples) = (Vec::new(), 0u32, 0u64);
+        for r in ranges {
+            bytes.extend([r.start.to_le_bytes(), r.end.to_le_bytes()].concat());
+            count += 1;
+            samples += u64::from(r.end - r.start);
+        }
+        let pieces = [1u64, samples].map(u64::to_le_bytes).concat();
+        [&pieces, &count.to_le_bytes()[..], &bytes, &[0; 120]].concat()
+    };
+    let start = std::time::Instant::now();
+    let falling = tiles(&mut (0..COUNT).rev().map(|i| 8 * i..8 * i + 1));
+    let why = read(&falling, &[]);
+    assert!(why.contains("cannot have samples"), "{why}");
+    for wrong in [
+        [4..8, 8..12],
+        [4..8, 7..12],
+        [4..8, 4..4],
+        [4..8, 9..MOST_SAMPLES + 1],
+    ] {
+        let why = read(&tiles(&mut wrong.iter().cloned()), &[]);
+        assert!(why.contains("cannot have samples"), "{wrong:?}: {why}");
+    }
+    let rising = tiles(&mut (0..COUNT).map(|i| 8 * i..8 * i + 1));
+    let why = read(&rising, &[]);
+    assert!(
+        why.contains("misses its part of the net from sample 0"),
+        "{why}"
+    );
+    let seconds = start.elapsed().as_secs_f64();
+    println!("{seconds} s");
+    assert!(seconds < 2.0, "{seconds} s");
 }
