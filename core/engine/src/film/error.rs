@@ -31,11 +31,6 @@ impl Errors {
 }
 
 impl Film {
-    /// Estimated relative error of the picture, see [`Errors`]; `None` before all pixels have two nets.
-    pub fn relative_error(&self) -> Option<f64> {
-        self.errors().map(|e| e.picture)
-    }
-
     /// Estimated relative errors; `None` before all pixels have two nets.
     pub fn errors(&self) -> Option<Errors> {
         let of = |i| self.estimate(i);
