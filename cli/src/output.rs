@@ -200,7 +200,9 @@ pub fn image(scene: &Scene, rendered: &Rendered) -> (Image, Vec<Aov>) {
                 }
             }
             Aov::Samples => image.push(name, [("N", of(&|e| f64::from(e.samples)))]),
-            Aov::Variance if estimates.iter().all(|e| e.variance.is_none()) => missing.push(aov),
+            Aov::Variance if film.is_faint() || estimates.iter().all(|e| e.variance.is_none()) => {
+                missing.push(aov);
+            }
             // A pixel that was interrupted before its variance could be known says so.
             Aov::Variance => {
                 let lane = |k: usize| of(&|e| e.variance.map_or(f64::NAN, |v| v[k]));
@@ -230,7 +232,7 @@ pub fn wants_features(scene: &Scene) -> bool {
 pub fn tell_missing(missing: &[Aov]) {
     for layer in missing {
         crate::console::info(format!(
-            "the layer '{}' is left out: it takes more samples to know it",
+            "the layer '{}' is left out: it takes more samples, or more light, to know it",
             layer.name()
         ));
     }

@@ -131,7 +131,10 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let (mut image, missing) = output::image(&described, &rendered);
     output::tell_missing(&missing);
     let certainty = Certainty::of(&rendered.film);
-    certainty.tell();
+    // Whatever broke has told its own reason.
+    if broken.is_none() {
+        certainty.tell();
+    }
     let about = About {
         input: a.input.display().to_string(),
         integrator: integrator.title(),

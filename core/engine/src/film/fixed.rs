@@ -54,13 +54,22 @@ pub fn add(a: &mut [i128; 3], b: [i128; 3]) {
     }
 }
 
-/// A sum of squares: 192 bits, low ones first, 88 of them fractional. Squares have twice the range of values: this has room
-/// for radiances from 10⁻¹³ to [`LARGEST`].
+/// A sum of squares: 192 bits, low ones first, 88 of them fractional. Squares have twice the range of values: this has room for
+/// radiances up to [`LARGEST`]; for what is below, see [`is_faint`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Squares(pub [u64; 3]);
 
 /// Fractional bits of sums of squares.
 const SQUARES: i32 = 88;
+
+/// True if a mean is so small that [`Squares`] cannot tell its variance.
+///
+/// The square of each net is cut off by up to 2⁻⁸⁸, so the variance of a mean of N samples is too low by up to 2·2⁻⁸⁸/N, that is by up
+/// to (1.4·10⁻¹⁴)² with two nets of 16. Errors are relative to a tenth of the mean or more (see [`super::Errors`]): here, that is 0.14 %.
+pub fn is_faint(mean: f64) -> bool {
+    const FAINT: f64 = 1e-10;
+    mean != 0.0 && mean.abs() < FAINT
+}
 
 impl Squares {
     /// A non-negative number, rounded toward zero. What does not fit becomes the largest number that does.

@@ -17,6 +17,7 @@ mod tile;
 pub use buffer::{Buffer, FeatureSums};
 pub use coverage::Coverage;
 pub use error::Errors;
+pub use error::TOO_FAINT;
 pub use fixed::MOST_SAMPLES;
 pub(crate) use fixed::UNFIT;
 pub use interval::Interval;

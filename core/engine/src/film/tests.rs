@@ -224,3 +224,65 @@ fn ranges_are_read_in_order() {
     println!("{seconds} s");
     assert!(seconds < 2.0, "{seconds} s");
 }
+
+/// What squares cannot carry is unknown, not zero.
+#[test]
+fn faint_pictures_have_no_error() {
+    let with = |exposure: f32, halves: bool| {
+        let mut film = match halves {
+            true => Film::in_halves(WINDOW, false),
+            false => Film::new(WINDOW, false),
+        };
+        for (rect, number) in film.tiles().flat_map(|r| (0..4).map(move |n| (r, n))) {
+            let samples = nets::nth(number);
+            let mut b = Buffer::new(rect.min, rect.max, samples.clone(), false);
+            for (x, y) in (rect.min[1]..rect.max[1])
+                .flat_map(|y| (rect.min[0]..rect.max[0]).map(move |x| (x, y)))
+            {
+                for i in samples.clone() {
+                    let key = u64::from(x) << 40 | u64::from(y) << 20 | u64::from(i);
+                    let sample = PixelSample {
+                        radiance: Spectrum::splat(exposure * Stream::new(mix(key)).uniform()),
+                        ..PixelSample::default()
+                    };
+                    b.add(x, y, &sample).unwrap();
+                }
+            }
+            film.half(number % 2 == 1).merge(b, &BOX).unwrap();
+        }
+        film
+    };
+    let truth = with(1.0, true).errors().unwrap().picture;
+    let mut widths = Vec::new();
+    for halves in [false, true] {
+        // Powers of two, which change no bit but the exponent's: 1.2e-10, 7.3e-12, 5.6e-17 and 4.3e-19.
+        for (exponent, faint) in [(-32, false), (-36, true), (-53, true), (-60, true)] {
+            let film = with(2f32.powi(exponent), halves);
+            assert_eq!(film.is_faint(), faint);
+            assert_eq!(film.errors().is_none(), faint);
+            let interval = film.interval().unwrap();
+            assert!(interval.half_width.iter().all(|h| h.is_nan() == faint));
+            assert!(
+                film.half_widths()
+                    .iter()
+                    .flatten()
+                    .all(|h| h.is_nan() == faint)
+            );
+            // The mean is good for much less.
+            let mean = 2f64.powi(-exponent) * film.interval().unwrap().mean[0];
+            assert!((mean - 0.5).abs() < 0.01, "{mean}");
+            if let Some(e) = film.errors() {
+                assert!((e.picture / truth - 1.0).abs() < if halves { 1e-3 } else { 0.1 });
+                widths.push(interval.half_width[0] / interval.mean[0]);
+            }
+        }
+        // Black is known.
+        let black = with(0.0, halves);
+        assert!(!black.is_faint());
+        assert_eq!(black.errors().unwrap().picture, 0.0);
+        assert_eq!(black.interval().unwrap().half_width, [0.0; 3]);
+    }
+    let bright = with(1.0, true).interval().unwrap();
+    let width = bright.half_width[0] / bright.mean[0];
+    assert!((widths[1] / width - 1.0).abs() < 1e-3, "{widths:?} {width}");
+}

@@ -14,7 +14,7 @@ pub(crate) use adaptive::tests::unfinished;
 
 use crate::checkpoint::State;
 use crate::error::{Error, Result};
-use crate::film::Film;
+use crate::film::{Film, TOO_FAINT};
 use crate::plugin::ForeignIntegrator;
 use crate::scene::{Counters, Scene};
 use job::Job;
@@ -172,6 +172,11 @@ pub fn go_on(
             rendered: (!rendered.film.is_empty()).then(|| Box::new(rendered)),
         })),
     }
+}
+
+/// Why a render to an error that cannot be told ends.
+fn too_faint() -> String {
+    format!("{TOO_FAINT}, or ask for a number of samples instead of an error")
 }
 
 /// The state in which a render begins.
