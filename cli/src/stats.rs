@@ -58,6 +58,8 @@ pub struct Run<'r> {
     pub rendered: &'r Rendered,
     /// What was to be done.
     pub plan: &'r Plan,
+    /// Bytes of memory that sums and picture take.
+    pub memory: u64,
     /// Times.
     pub seconds: Seconds,
     /// How certain it is.
@@ -229,6 +231,7 @@ fn figures(run: &Run) -> Value {
         "image": {
             "resolution": run.described.film.resolution,
             "window": run.described.film.window(),
+            "memory_bytes": run.memory,
         },
         "sampling": {
             "seed": run.described.sampling.seed,

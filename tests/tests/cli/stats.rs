@@ -174,6 +174,53 @@ fn figures_are_complete_and_plausible() {
     }
 }
 
+/// What is counted before a render, to refuse what memory cannot hold, is what it takes, with and without all that costs memory.
+#[test]
+#[cfg(target_os = "linux")]
+fn memory_is_what_was_counted() {
+    let at = folder("stats-memory");
+    let cases: [&[&str]; 4] = [
+        &["--integrator", "pt", "--aov", "error_95"],
+        &[
+            "--integrator",
+            "pt",
+            "--aov",
+            "orders:2,depth,normal,variance",
+            "--checkpoint",
+            "a.ckpt",
+        ],
+        &["--integrator", "light", "--aov", "error_95"],
+        &[
+            "--integrator",
+            "light",
+            "--aov",
+            "orders:2",
+            "--checkpoint",
+            "b.ckpt",
+        ],
+    ];
+    for options in cases {
+        let peak = |size: &str| {
+            let _ = ["a.ckpt", "b.ckpt"].map(|f| std::fs::remove_file(at.join(f)));
+            let fixed = ["--stats", "s.json", "--spp", "1", "--resolution", size];
+            let all = [&fixed, options].concat();
+            render(&at, &scene("caustic/caustic.json"), "a.exr", &all);
+            let s = json(&at.join("s.json"));
+            (
+                number(&s, "/peak_memory_bytes"),
+                number(&s, "/image/memory_bytes"),
+            )
+        };
+        let ((small, _), (peak, counted)) = (peak("8x8"), peak("600x400"));
+        let taken = peak - small;
+        println!("{options:?}: {taken:e}, counted {counted:e}");
+        assert!(
+            (0.75..1.05).contains(&(taken / counted)),
+            "{options:?}: {taken} {counted}"
+        );
+    }
+}
+
 /// A picture too faint for its error says so, and is none that meets a goal; one with exposure is as good as any.
 #[test]
 fn faint_pictures_tell() {

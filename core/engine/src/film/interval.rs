@@ -67,20 +67,22 @@ impl Film {
     /// A pixel's own few nets will not do: where bright light is rare, who has not met it has both mean and variance too low. Its
     /// neighbours' luck is not its own.
     pub fn half_widths(&self) -> Vec<[f64; 3]> {
-        let estimates: Vec<Estimate> = (0..self.pixels.len()).map(|i| self.estimate(i)).collect();
-        let mut out = vec![[f64::NAN; 3]; estimates.len()];
+        let mut out = vec![[f64::NAN; 3]; self.pixels.len()];
         if self.is_faint() {
             return out;
         }
         for rect in self.tiles() {
-            for own in rect.indices(self.window) {
-                let near = rect.near(self.window, own, REACH).indices(self.window);
+            let window = [rect.min[0], rect.min[1], rect.max[0], rect.max[1]];
+            let pixels = rect.indices(self.window);
+            let estimates: Vec<Estimate> = pixels.clone().map(|i| self.estimate(i)).collect();
+            for (own, i) in pixels.enumerate() {
+                let near = rect.near(window, own, REACH).indices(window);
                 for k in 0..3 {
                     let near = near.clone().map(|i| {
                         let e = &estimates[i];
                         (e.variance.map_or(f64::NAN, |v| v[k]), e.degrees[k])
                     });
-                    out[own][k] = half_width(near);
+                    out[i][k] = half_width(near);
                 }
             }
         }
