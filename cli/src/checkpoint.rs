@@ -103,8 +103,8 @@ pub fn write(file: &Path, bytes: &[u8]) -> Result<(), Failure> {
     .map_err(failed)
 }
 
-/// What must be the same for all parts of a picture: the scene, the files it names, the plugins, this program. What only says how
-/// long to sample, or which layers to write of the same sums, may differ.
+/// What must be the same for all parts of a picture: the scene, the files it names, the plugins, this program, and what has sums of
+/// its own. What only says how long to sample, or which layers to write of the same sums, may differ.
 fn identity(scene: &describe::Scene, registry: &Registry) -> Outcome<Value> {
     let mut text: Value = serde_json::from_str(&scene.to_text().map_err(input)?).map_err(failed)?;
     let of = |value: &mut Value, section: &str, names: &[&str]| {
@@ -131,10 +131,13 @@ fn identity(scene: &describe::Scene, registry: &Registry) -> Outcome<Value> {
         let name = format!("{} {}", p.kind.name(), p.name());
         plugins.insert(name, p.decl.version.clone().into());
     }
+    let is_orders = |a: &&describe::Aov| matches!(a, describe::Aov::Orders(_));
+    let orders = scene.film.aovs.iter().find(is_orders);
     Ok(json!({
         "resolvent": env!("CARGO_PKG_VERSION"),
         "scene": text,
         "first-vertex layers (depth, albedo, normal)": crate::output::wants_features(scene),
+        "layers by scattering order": orders.map(ToString::to_string),
         "files": files,
         "plugins": plugins,
     }))

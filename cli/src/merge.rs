@@ -54,6 +54,7 @@ pub fn run(a: &Merge) -> Outcome {
     let (mut image, missing) = output::image(&scene, &rendered);
     output::tell_missing(&missing);
     let certainty = stats::Certainty::of(&rendered.film);
+    certainty.tell();
     image.metadata = stats::metadata(&about, &scene, &rendered, &certainty);
     output::write(&a.tone, &image, &targets)?;
     console::info(format!(

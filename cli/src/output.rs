@@ -2,8 +2,7 @@
 
 use crate::args::{Tone, ToneCurve};
 use crate::failure::{Outcome, failed, input};
-use resolvent_engine::Rendered;
-use resolvent_engine::film::{Estimate, Features};
+use resolvent_engine::{Rendered, Settings};
 use resolvent_image::{BEAUTY, Curve, Image, ToneMap};
 use resolvent_scene::{Aov, Scene};
 use std::fs::OpenOptions;
@@ -93,26 +92,30 @@ pub fn check_writable(path: &Path) -> Outcome<()> {
     }
 }
 
-/// Refuses a picture that memory cannot hold, before the system ends the program for it. `films` is how many times its sums are
-/// held; `orders` of the layers are of light by scattering order.
-pub fn check_memory(
-    window: [u32; 4],
-    features: bool,
-    [layers, orders]: [usize; 2],
-    films: usize,
-) -> Outcome<()> {
-    let pixels = u64::from(window[2] - window[0]) * u64::from(window[3] - window[1]);
-    let sums = size_of::<resolvent_engine::film::Pixel>()
-        + usize::from(features) * size_of::<resolvent_engine::film::FeatureSums>()
-        // Walks from the sensor and from lights.
-        + orders * 2 * size_of::<[i128; 3]>();
-    // The picture is held as f32, and once more while it is written.
-    let need = pixels * (films * sums + 2 * 4 * (4 + 3 * (layers + orders))) as u64;
+/// Bytes of memory that the sums and the picture take at most; `keeps`: with checkpoints.
+pub fn memory(scene: &Scene, settings: &Settings, keeps: bool) -> u64 {
+    let channels = |aov: &Aov| match aov {
+        Aov::Depth | Aov::Samples => 1,
+        Aov::Orders(_) => 3 * scene.film.order_layers(),
+        _ => 3,
+    };
+    let channels = 4 + scene.film.aovs.iter().map(channels).sum::<usize>();
+    let [x0, y0, x1, y1] = settings.window;
+    let pixels = u64::from(x1 - x0) * u64::from(y1 - y0);
+    // Held as f32, and once more while it is written. By then the last checkpoint, the sums once more, is on the disk.
+    let picture = 2 * pixels * (channels * size_of::<f32>()) as u64;
+    // Any other integrator may send walks from lights; that it does is known by the first of them.
+    let sums = settings.film_bytes(scene.integrator.plugin != "pt");
+    sums + picture.max(if keeps { sums } else { 0 })
+}
+
+/// Refuses a picture that memory cannot hold, before the system ends the program for it.
+pub fn check_memory([x0, y0, x1, y1]: [u32; 4], need: u64) -> Outcome<()> {
     match crate::system::available_memory() {
         Some(free) if need > free => Err(input(format!(
             "a picture of {} x {} pixels needs {} of memory, {} are free: render it in parts with --crop",
-            window[2] - window[0],
-            window[3] - window[1],
+            x1 - x0,
+            y1 - y0,
             bytes(need),
             bytes(free)
         ))),
@@ -133,91 +136,74 @@ pub fn bytes(n: u64) -> String {
     format!("{value:.digits$} {}", units[unit])
 }
 
-/// The picture with its layers. Layers that cannot be known yet are left out; they are returned.
+/// The picture with its layers. Layers that cannot be known are left out; they are returned.
 pub fn image(scene: &Scene, rendered: &Rendered) -> (Image, Vec<Aov>) {
     let film = &rendered.film;
     let [w, h] = film.size();
     let window = scene.film.window();
     let count = w as usize * h as usize;
-    let estimates: Vec<Estimate> = (0..count).map(|i| film.estimate(i)).collect();
     let mut image = Image::new(w as usize, h as usize);
     image.origin = [window[0] as i32, window[1] as i32];
     image.full = scene.film.resolution.map(|n| n as usize);
-    let of = |f: &dyn Fn(&Estimate) -> f64| -> Vec<f32> {
-        estimates.iter().map(|e| f(e) as f32).collect()
-    };
-    image.push(
-        BEAUTY,
-        [
-            ("R", of(&|e| e.mean[0])),
-            ("G", of(&|e| e.mean[1])),
-            ("B", of(&|e| e.mean[2])),
-            ("A", of(&|e| e.alpha)),
-        ],
-    );
-    let features: Vec<Features> = if wants_features(scene) {
-        (0..count).map(|i| film.features(i)).collect()
-    } else {
-        Vec::new()
-    };
-    let per_feature = |f: &dyn Fn(&Features) -> f64| -> Vec<f32> {
-        features.iter().map(|x| f(x) as f32).collect()
-    };
+    push(&mut image, BEAUTY, ["R", "G", "B", "A"], |i| {
+        let e = film.estimate(i);
+        [e.mean[0], e.mean[1], e.mean[2], e.alpha]
+    });
+    let has_variance =
+        || !film.is_faint() && (0..count).any(|i| film.estimate(i).variance.is_some());
     let mut missing = Vec::new();
     let mut aovs = scene.film.aovs.clone();
     aovs.sort();
     for aov in aovs {
-        let name = aov.name();
+        let (name, image) = (aov.name(), &mut image);
         match aov {
-            Aov::Depth => image.push(name, [("Z", per_feature(&|f| f.depth))]),
-            Aov::Albedo => image.push(
-                name,
-                [
-                    ("R", per_feature(&|f| f.albedo[0])),
-                    ("G", per_feature(&|f| f.albedo[1])),
-                    ("B", per_feature(&|f| f.albedo[2])),
-                ],
-            ),
-            Aov::Normal => image.push(
-                name,
-                [
-                    ("X", per_feature(&|f| f.normal[0])),
-                    ("Y", per_feature(&|f| f.normal[1])),
-                    ("Z", per_feature(&|f| f.normal[2])),
-                ],
-            ),
+            Aov::Depth => push(image, name, ["Z"], |i| [film.features(i).depth]),
+            Aov::Albedo => push(image, name, RGB, |i| film.features(i).albedo),
+            Aov::Normal => push(image, name, ["X", "Y", "Z"], |i| film.features(i).normal),
             Aov::Orders(n) if film.orders() != n as usize + 2 => missing.push(aov),
             Aov::Orders(n) => {
                 for k in 0..=n as usize + 1 {
-                    let of = |i: usize, lane: usize| film.order(i, k)[lane] as f32;
-                    let lane = |lane: usize| (0..count).map(|i| of(i, lane)).collect();
                     let name = if k <= n as usize {
                         format!("order{k}")
                     } else {
                         "order_rest".to_owned()
                     };
-                    image.push(&name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
+                    push(image, &name, RGB, |i| film.order(i, k));
                 }
             }
-            Aov::Samples => image.push(name, [("N", of(&|e| f64::from(e.samples)))]),
-            Aov::Variance if estimates.iter().all(|e| e.variance.is_none()) => missing.push(aov),
+            Aov::Samples => push(image, name, ["N"], |i| [film.estimate(i).samples.into()]),
+            Aov::Variance | Aov::Error95 if !has_variance() => missing.push(aov),
             // A pixel that was interrupted before its variance could be known says so.
-            Aov::Variance => {
-                let lane = |k: usize| of(&|e| e.variance.map_or(f64::NAN, |v| v[k]));
-                image.push(name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
-            }
+            Aov::Variance => push(image, name, RGB, |i| {
+                film.estimate(i).variance.unwrap_or([f64::NAN; 3])
+            }),
             Aov::Error95 => {
                 let half_widths = film.half_widths();
-                if half_widths.iter().all(|h| h[0].is_nan()) {
-                    missing.push(aov);
-                    continue;
-                }
-                let lane = |k: usize| half_widths.iter().map(|h| h[k] as f32).collect();
-                image.push(name, [("R", lane(0)), ("G", lane(1)), ("B", lane(2))]);
+                push(image, name, RGB, |i| half_widths[i]);
             }
         }
     }
     (image, missing)
+}
+
+/// Channels of colours.
+const RGB: [&str; 3] = ["R", "G", "B"];
+
+/// Adds a layer by what its channels have at each pixel.
+fn push<const N: usize>(
+    image: &mut Image,
+    layer: &str,
+    names: [&str; N],
+    of: impl Fn(usize) -> [f64; N],
+) {
+    let count = image.width * image.height;
+    let mut channels = names.map(|name| (name, Vec::with_capacity(count)));
+    for i in 0..count {
+        for ((_, data), v) in channels.iter_mut().zip(of(i)) {
+            data.push(v as f32);
+        }
+    }
+    image.push(layer, channels);
 }
 
 /// True if a layer is asked for that only the first vertex of a path can tell.
@@ -230,7 +216,7 @@ pub fn wants_features(scene: &Scene) -> bool {
 pub fn tell_missing(missing: &[Aov]) {
     for layer in missing {
         crate::console::info(format!(
-            "the layer '{}' is left out: it takes more samples to know it",
+            "the layer '{}' is left out: it takes more samples, or more light, to know it",
             layer.name()
         ));
     }

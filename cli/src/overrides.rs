@@ -3,12 +3,10 @@
 use crate::args::Render;
 use crate::failure::{Outcome, input};
 use resolvent_engine::Goal;
+use resolvent_engine::film::MOST_SAMPLES;
 use resolvent_scene::{Budget, PluginBlock, Scene};
 use std::ops::Range;
 use std::time::Duration;
-
-/// Most samples a pixel's sums have room for (see [`resolvent_engine::film`]).
-const MOST_SAMPLES: u32 = 1 << 23;
 
 /// Which samples to take, and when to stop.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,9 +81,10 @@ fn plan(a: &Render, scene: &Scene) -> Outcome<Plan> {
     let all = 0..MOST_SAMPLES;
     let plan = |samples, goal| Ok(Plan { samples, goal });
     if let Some(range) = &a.sample_range {
-        if range.0.len() > MOST_SAMPLES as usize {
+        let Range { start, end } = range.0;
+        if end > MOST_SAMPLES {
             return Err(input(format!(
-                "--sample-range may hold at most {MOST_SAMPLES} samples"
+                "--sample-range {start}..{end} is beyond {MOST_SAMPLES}, the most samples that a pixel can have"
             )));
         }
         return plan(range.0.clone(), Goal::Samples);

@@ -15,7 +15,7 @@ use crate::watch;
 use resolvent_api::{Affine, PluginKind};
 use resolvent_engine::plugin::{ForeignIntegrator, Message, Registry, set_log};
 use resolvent_engine::scene::Scene;
-use resolvent_engine::{Goal, Keep, Rendered, Settings, go_on, with_threads};
+use resolvent_engine::{Keep, Rendered, Settings, go_on, with_threads};
 use resolvent_scene as describe;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -84,23 +84,13 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         save_scene(&described, &registry, file)?;
     }
     seconds.build(&built.preparation);
-    let features = output::wants_features(&described);
     let keeper = Keeper::new(a, &described, &registry, &integrator)?;
-    let halves = 1 + usize::from(matches!(plan.goal, Goal::Error(_)));
-    let films = halves * (1 + usize::from(keeper.is_some()));
-    let layers = described.film.aovs.len();
-    let orders = described.film.order_layers();
-    output::check_memory(described.film.window(), features, [layers, orders], films)?;
+    let settings = settings(&described, &plan);
+    let memory = output::memory(&described, &settings, keeper.is_some());
+    output::check_memory(settings.window, memory)?;
 
     let cpu = crate::system::cpu_seconds().unwrap_or(0.0);
-    let rendered = render(
-        &built,
-        &integrator,
-        &described,
-        &plan,
-        keeper.as_ref(),
-        a.aim.every,
-    )?;
+    let rendered = render(&built, &integrator, &settings, keeper.as_ref(), a.aim.every)?;
     seconds.render_cpu = crate::system::cpu_seconds().unwrap_or(0.0) - cpu;
     interrupt::enter(Phase::Writing);
     let (rendered, broken) = match rendered {
@@ -131,7 +121,10 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
     let (mut image, missing) = output::image(&described, &rendered);
     output::tell_missing(&missing);
     let certainty = Certainty::of(&rendered.film);
-    certainty.tell();
+    // Whatever broke has told its own reason.
+    if broken.is_none() {
+        certainty.tell();
+    }
     let about = About {
         input: a.input.display().to_string(),
         integrator: integrator.title(),
@@ -148,6 +141,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
             scene: &built,
             rendered: &rendered,
             plan: &plan,
+            memory,
             seconds,
             certainty: &certainty,
         };
@@ -220,15 +214,8 @@ fn save_scene(scene: &describe::Scene, registry: &Registry, file: &std::path::Pa
     Ok(())
 }
 
-fn render(
-    scene: &Scene,
-    integrator: &ForeignIntegrator,
-    described: &describe::Scene,
-    plan: &Plan,
-    keeper: Option<&Keeper>,
-    every: f64,
-) -> Outcome<Result<Rendered, Box<resolvent_engine::Broken>>> {
-    let settings = Settings {
+fn settings(described: &describe::Scene, plan: &Plan) -> Settings {
+    Settings {
         resolution: described.film.resolution,
         window: described.film.window(),
         samples: plan.samples.clone(),
@@ -236,7 +223,16 @@ fn render(
         seed: described.sampling.seed,
         features: output::wants_features(described),
         orders: described.film.order_layers(),
-    };
+    }
+}
+
+fn render(
+    scene: &Scene,
+    integrator: &ForeignIntegrator,
+    settings: &Settings,
+    keeper: Option<&Keeper>,
+    every: f64,
+) -> Outcome<Result<Rendered, Box<resolvent_engine::Broken>>> {
     let from = keeper.map_or(Ok(None), Keeper::load)?;
     let save = |bytes: &[u8]| {
         if let Some(keeper) = keeper {
@@ -249,11 +245,11 @@ fn render(
         about: &k.about,
         save: &save,
     });
-    let display = Display::new(plan.goal, plan.samples.len() as u32);
+    let display = Display::new(settings.goal, settings.samples.len() as u32);
     interrupt::enter(Phase::Rendering);
     let stop = &interrupt::STOP;
     let report = |p| display.report(p);
-    let rendered = go_on(from, scene, integrator, &settings, keep, stop, &report);
+    let rendered = go_on(from, scene, integrator, settings, keep, stop, &report);
     display.finish();
     Ok(rendered)
 }

@@ -5,7 +5,7 @@ use crate::console;
 use crate::failure::{Outcome, failed};
 use crate::overrides::Plan;
 use crate::progress;
-use resolvent_engine::film::{Errors, Film, Interval};
+use resolvent_engine::film::{Errors, Film, Interval, TOO_FAINT};
 use resolvent_engine::plugin::Registry;
 use resolvent_engine::scene::{Preparation, Scene};
 use resolvent_engine::{Goal, Rendered};
@@ -58,6 +58,8 @@ pub struct Run<'r> {
     pub rendered: &'r Rendered,
     /// What was to be done.
     pub plan: &'r Plan,
+    /// Bytes of memory that sums and picture take.
+    pub memory: u64,
     /// Times.
     pub seconds: Seconds,
     /// How certain it is.
@@ -74,6 +76,7 @@ pub fn total_samples(rendered: &Rendered) -> u64 {
 
 /// How certain a picture is.
 pub struct Certainty {
+    faint: bool,
     errors: Option<Errors>,
     interval: Option<Interval>,
 }
@@ -82,13 +85,17 @@ impl Certainty {
     /// Of a film.
     pub fn of(film: &Film) -> Self {
         Self {
+            faint: film.is_faint(),
             errors: film.errors(),
             interval: film.interval(),
         }
     }
 
-    /// Says so if the error is not to be trusted.
+    /// Says so if the error is not known, or not to be trusted.
     pub fn tell(&self) {
+        if self.faint {
+            console::warning(TOO_FAINT);
+        }
         if self.errors.is_some_and(|e| e.are_doubtful()) {
             console::info(
                 "few pixels have most of the estimated error: light that is rare and bright may be missing, and the true error be larger than stated",
@@ -224,6 +231,7 @@ fn figures(run: &Run) -> Value {
         "image": {
             "resolution": run.described.film.resolution,
             "window": run.described.film.window(),
+            "memory_bytes": run.memory,
         },
         "sampling": {
             "seed": run.described.sampling.seed,

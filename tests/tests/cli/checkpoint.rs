@@ -135,7 +135,7 @@ fn what_differs_is_named() {
         merge(&at, &["a.ckpt", "a.ckpt"], "x.exr"),
         &["samples 0..16", "(0, 0)"],
     );
-    let cases: [(&[&str], &[&str]); 4] = [
+    let cases: [(&[&str], &[&str]); 5] = [
         (&["--seed", "5"], &["scene.sampling.seed is 0 there and 5"]),
         (
             &["--resolution", "25x16"],
@@ -146,6 +146,10 @@ fn what_differs_is_named() {
             &["scene.integrator.plugin", "bdpt"],
         ),
         (&["--aov", "depth"], &["layers", "true"]),
+        (
+            &["--aov", "orders:2"],
+            &["layers by scattering order is nothing there and orders:2 here"],
+        ),
     ];
     for (change, parts) in cases {
         let more = [&["--resume"], change].concat();

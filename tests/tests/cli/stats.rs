@@ -1,6 +1,6 @@
 //! `--stats`: what a scene does not have costs nothing.
 
-use crate::program::{Run, changed, folder, json, render, scene, vdb};
+use crate::program::{Run, changed, folder, json, mean, picture, render, scene, vdb};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -171,5 +171,99 @@ fn figures_are_complete_and_plausible() {
     if cfg!(target_os = "linux") {
         let peak = number(&s, "/peak_memory_bytes");
         assert!((1e6..1e9).contains(&peak), "{peak}");
+    }
+}
+
+/// What is counted before a render, to refuse what memory cannot hold, is what it takes, with and without all that costs memory.
+#[test]
+#[cfg(target_os = "linux")]
+fn memory_is_what_was_counted() {
+    let at = folder("stats-memory");
+    let cases: [&[&str]; 4] = [
+        &["--integrator", "pt", "--aov", "error_95"],
+        &[
+            "--integrator",
+            "pt",
+            "--aov",
+            "orders:2,depth,normal,variance",
+            "--checkpoint",
+            "a.ckpt",
+        ],
+        &["--integrator", "light", "--aov", "error_95"],
+        &[
+            "--integrator",
+            "light",
+            "--aov",
+            "orders:2",
+            "--checkpoint",
+            "b.ckpt",
+        ],
+    ];
+    for options in cases {
+        let peak = |size: &str| {
+            let _ = ["a.ckpt", "b.ckpt"].map(|f| std::fs::remove_file(at.join(f)));
+            let fixed = ["--stats", "s.json", "--spp", "1", "--resolution", size];
+            let all = [&fixed, options].concat();
+            render(&at, &scene("caustic/caustic.json"), "a.exr", &all);
+            let s = json(&at.join("s.json"));
+            (
+                number(&s, "/peak_memory_bytes"),
+                number(&s, "/image/memory_bytes"),
+            )
+        };
+        let ((small, _), (peak, counted)) = (peak("8x8"), peak("600x400"));
+        let taken = peak - small;
+        println!("{options:?}: {taken:e}, counted {counted:e}");
+        assert!(
+            (0.75..1.05).contains(&(taken / counted)),
+            "{options:?}: {taken} {counted}"
+        );
+    }
+}
+
+/// A picture too faint for its error says so, and is none that meets a goal; one with exposure is as good as any.
+#[test]
+fn faint_pictures_tell() {
+    let at = folder("stats-faint");
+    let dim = |exposure: i32| {
+        changed(&at, "bench/box_fog.json", |s| {
+            for light in s["shapes"].as_array_mut().into_iter().flatten() {
+                let emission = light.get_mut("emission").and_then(Value::as_array_mut);
+                if let Some(all) = emission {
+                    for v in all {
+                        *v = (v.as_f64().unwrap_or(0.0) * 0.5f64.powi(50)).into();
+                    }
+                }
+            }
+            s["camera"]["exposure"] = exposure.into();
+        })
+    };
+    let remedy = "raise the camera's exposure";
+    let run = |scene: &Path, options: &[&str]| {
+        let scene = scene.to_string_lossy();
+        let fixed = ["render", &scene, "-q", "-o", "a.exr", "--stats", "s.json"];
+        let size = ["--resolution", "12x8"];
+        Run::new(&at, [&fixed[..], &size, options].concat())
+    };
+    let options = ["--spp", "64", "--aov", "orders:2,error_95,variance"];
+    for (exposure, faint) in [(0, true), (50, false)] {
+        let told = run(&dim(exposure), &options).done().stderr;
+        let s = json(&at.join("s.json"));
+        assert_eq!(told.matches(remedy).count(), usize::from(faint), "{told}");
+        assert_eq!(s["sampling"]["estimated_error"].is_null(), faint);
+        assert_eq!(s["sampling"]["mean"]["error_95"][0].is_null(), faint);
+        let image = picture(&at.join("a.exr"));
+        assert!(mean(&image) > 0.0);
+        for layer in ["error_95", "variance"] {
+            assert_eq!(image.layer(layer).is_none(), faint, "{layer}");
+        }
+        assert!(image.layer("order1").is_some());
+    }
+    for integrator in ["pt", "bdpt"] {
+        let options = ["--error", "0.5", "--integrator", integrator];
+        let refused = run(&dim(0), &options);
+        assert_eq!(refused.code, Some(2), "{refused:?}");
+        assert_eq!(refused.stderr.matches(remedy).count(), 1, "{refused:?}");
+        run(&dim(50), &options).done();
     }
 }

@@ -73,7 +73,11 @@ impl State {
         let mut film = Film::read("", window, features, &mut from)?;
         let mut adaptive = None;
         if header["halves"] == 2 {
-            film.set_twin(Film::read("twin/", window, features, &mut from)?);
+            let twin = Film::read("twin/", window, features, &mut from)?;
+            if twin.orders() != film.orders() {
+                return Err("is damaged: its halves differ in their layers".into());
+            }
+            film.set_twin(twin);
             adaptive = Some(Adaptive::read(&film, &mut from)?);
         }
         from.finish()?;

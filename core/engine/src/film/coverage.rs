@@ -55,12 +55,32 @@ impl Coverage {
         Ok(())
     }
 
+    /// Adds a range after all others, which it must not touch; false if it is not one.
+    pub fn push(&mut self, new: Range<u32>) -> bool {
+        let good = !new.is_empty() && self.0.last().is_none_or(|last| last.end < new.start);
+        if good {
+            self.0.push(new);
+        }
+        good
+    }
+
     /// Adds all samples of another.
     ///
     /// # Errors
-    /// The first of its samples that are there already; some others may have been added.
+    /// The first of its samples that are there already; then nothing is changed.
     pub fn join(&mut self, other: &Self) -> Result<(), Range<u32>> {
-        other.0.iter().try_for_each(|r| self.insert(r.clone()))
+        let mut all = [&self.0[..], &other.0[..]].concat();
+        all.sort_by_key(|r| r.start);
+        let mut joined: Vec<Range<u32>> = Vec::with_capacity(all.len());
+        for r in all {
+            match joined.last_mut() {
+                Some(last) if r.start < last.end => return Err(r.start..r.end.min(last.end)),
+                Some(last) if r.start == last.end => last.end = r.end,
+                _ => joined.push(r),
+            }
+        }
+        self.0 = joined;
+        Ok(())
     }
 
     /// What of `wanted` is not there.
@@ -157,5 +177,48 @@ mod tests {
             assert_eq!(c.beyond(&wanted).map(|r| r.start), outside);
             assert!(c.0.windows(2).all(|w| w[0].end < w[1].start));
         }
+    }
+
+    /// Joining is adding range by range.
+    #[test]
+    fn sets_join() {
+        let mut s = Stream::new(8);
+        let (mut joined, mut refused) = (0, 0);
+        for _ in 0..2000 {
+            let mut set = || {
+                let mut c = Coverage::default();
+                for _ in 0..3 {
+                    let begin = (s.uniform() * 100.0) as u32;
+                    let _ = c.insert(begin..begin + (s.uniform() * 20.0) as u32);
+                }
+                c
+            };
+            let (a, b) = (set(), set());
+            let (mut there, mut back) = (a.clone(), a.clone());
+            match there.join(&b) {
+                Ok(()) => {
+                    b.0.iter().for_each(|r| back.insert(r.clone()).unwrap());
+                    assert_eq!(there, back);
+                    joined += 1;
+                }
+                Err(both) => {
+                    assert_eq!(there, a);
+                    let has = |c: &Coverage| c.missing(both.clone()).is_empty();
+                    assert!(!both.is_empty() && has(&a) && has(&b));
+                    refused += 1;
+                }
+            }
+        }
+        assert!(joined > 200 && refused > 200, "{joined} {refused}");
+    }
+
+    #[test]
+    fn only_what_follows_is_pushed() {
+        let mut c = Coverage::default();
+        assert!(c.push(3..5) && c.push(6..9));
+        for wrong in [9..10, 8..12, 0..1, 20..20] {
+            assert!(!c.push(wrong));
+        }
+        assert_eq!(c.0, [3..5, 6..9]);
     }
 }

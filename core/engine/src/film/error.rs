@@ -1,5 +1,6 @@
 //! How far a picture may be from the truth.
 
+use super::fixed::is_faint;
 use super::{Estimate, Film, tile};
 
 /// Relative errors: of a tile the square root of the mean over its pixels and lanes of variance/(M² + 0.01 m²), with M the tile's
@@ -23,6 +24,10 @@ pub struct Errors {
 /// Beyond this [`Errors::doubt`], that of 25 events, an error estimate is not to be trusted.
 pub const DOUBTFUL: f64 = 0.2;
 
+/// What is said of a picture that [`Film::is_faint`].
+pub const TOO_FAINT: &str =
+    "the picture is too faint for its error to be told: raise the camera's exposure";
+
 impl Errors {
     /// True if tails are so heavy that the errors are no more than a guess.
     pub fn are_doubtful(&self) -> bool {
@@ -31,15 +36,19 @@ impl Errors {
 }
 
 impl Film {
-    /// Estimated relative error of the picture, see [`Errors`]; `None` before all pixels have two nets.
-    pub fn relative_error(&self) -> Option<f64> {
-        self.errors().map(|e| e.picture)
+    /// True if the picture's mean is above zero but so small (below 10⁻¹⁰) that its variance cannot be told.
+    pub fn is_faint(&self) -> bool {
+        is_faint(mean((0..self.pixels.len()).map(|i| self.estimate(i))))
     }
 
-    /// Estimated relative errors; `None` before all pixels have two nets.
+    /// Estimated relative errors; `None` before all pixels have two nets, and of a picture that [`Film::is_faint`].
     pub fn errors(&self) -> Option<Errors> {
         let of = |i| self.estimate(i);
-        let floor = floor((0..self.pixels.len()).map(of));
+        let mean = mean((0..self.pixels.len()).map(of));
+        if is_faint(mean) {
+            return None;
+        }
+        let floor = floor(mean);
         let (mut sum, mut tails, mut worst) = (0.0, 0.0, 0f64);
         for t in self.tiles() {
             let x = Square::of(t.indices(self.window).map(of), floor)?;
@@ -56,7 +65,7 @@ impl Film {
 
     /// 0.01 m², by this half alone.
     pub(crate) fn half_floor(&self) -> f64 {
-        floor((0..self.pixels.len()).map(|i| self.half_estimate(i)))
+        floor(mean((0..self.pixels.len()).map(|i| self.half_estimate(i))))
     }
 
     /// Square of the relative error of a tile by this half alone, and one standard error of that square more: the first estimate
@@ -67,13 +76,17 @@ impl Film {
     }
 }
 
-/// What is added to the squares of means, so that black tiles do not count without bound.
-fn floor(pixels: impl ExactSizeIterator<Item = Estimate>) -> f64 {
+/// Mean radiance over pixels and lanes.
+fn mean(pixels: impl ExactSizeIterator<Item = Estimate>) -> f64 {
     let n = pixels.len().max(1) as f64;
-    let m = pixels
+    pixels
         .map(|e| e.mean.iter().sum::<f64>() / 3.0)
         .sum::<f64>()
-        / n;
+        / n
+}
+
+/// What is added to the squares of means in a picture of mean `m`, so that black tiles do not count without bound.
+fn floor(m: f64) -> f64 {
     0.01 * m * m
 }
 

@@ -1,5 +1,6 @@
 //! Intervals that cover the truth with a probability of 95 %.
 
+use super::fixed::is_faint;
 use super::tile::{self, tile_mean};
 use super::{Estimate, Film};
 
@@ -11,7 +12,8 @@ const REACH: u32 = 1;
 pub struct Interval {
     /// Mean over all pixels.
     pub mean: [f64; 3],
-    /// Half the width of the interval that covers the true mean with a probability of 95 %, Student's t of `degrees`.
+    /// Half the width of the interval that covers the true mean with a probability of 95 %, Student's t of `degrees`; NaN in lanes
+    /// too faint for it to be told (above zero, and below 10⁻¹⁰).
     pub half_width: [f64; 3],
     /// Degrees of freedom of the lane that has the least (Satterthwaite 1946). Few if little of the picture has most of the
     /// variance.
@@ -50,28 +52,37 @@ impl Film {
         });
         Some(Interval {
             mean,
-            half_width: [0, 1, 2].map(|k| student(degrees[k]) * variance[k].sqrt()),
+            half_width: [0, 1, 2].map(|k| match is_faint(mean[k]) {
+                true => f64::NAN,
+                false => student(degrees[k]) * variance[k].sqrt(),
+            }),
             degrees: degrees.into_iter().fold(f64::INFINITY, f64::min),
         })
     }
 
     /// Half the width of every pixel's 95 % interval, lane by lane: Student's t times the root of the mean variance of the 3 × 3 pixels
-    /// around it, as far as they are of its tile, with their degrees of freedom together. NaN before its tile has two nets.
+    /// around it, as far as they are of its tile, with their degrees of freedom together. NaN before its tile has two nets, and of a
+    /// picture that [`Film::is_faint`].
     ///
     /// A pixel's own few nets will not do: where bright light is rare, who has not met it has both mean and variance too low. Its
     /// neighbours' luck is not its own.
     pub fn half_widths(&self) -> Vec<[f64; 3]> {
-        let estimates: Vec<Estimate> = (0..self.pixels.len()).map(|i| self.estimate(i)).collect();
-        let mut out = vec![[f64::NAN; 3]; estimates.len()];
+        let mut out = vec![[f64::NAN; 3]; self.pixels.len()];
+        if self.is_faint() {
+            return out;
+        }
         for rect in self.tiles() {
-            for own in rect.indices(self.window) {
-                let near = rect.near(self.window, own, REACH).indices(self.window);
+            let window = [rect.min[0], rect.min[1], rect.max[0], rect.max[1]];
+            let pixels = rect.indices(self.window);
+            let estimates: Vec<Estimate> = pixels.clone().map(|i| self.estimate(i)).collect();
+            for (own, i) in pixels.enumerate() {
+                let near = rect.near(window, own, REACH).indices(window);
                 for k in 0..3 {
                     let near = near.clone().map(|i| {
                         let e = &estimates[i];
                         (e.variance.map_or(f64::NAN, |v| v[k]), e.degrees[k])
                     });
-                    out[own][k] = half_width(near);
+                    out[i][k] = half_width(near);
                 }
             }
         }

@@ -17,6 +17,8 @@ mod tile;
 pub use buffer::{Buffer, FeatureSums};
 pub use coverage::Coverage;
 pub use error::Errors;
+pub use error::TOO_FAINT;
+pub use fixed::MOST_SAMPLES;
 pub(crate) use fixed::UNFIT;
 pub use interval::Interval;
 pub use splat::Splats;
@@ -38,6 +40,19 @@ pub struct Pixel {
     alpha: i128,
     /// Σ over nets of (sum of the net)²/samples of the net.
     squares: [Squares; 3],
+}
+
+/// Bytes of memory that a film takes for each pixel: with features, `orders` layers by scattering order, light from walks that started
+/// at lights, and so many nets that are there in part.
+pub(crate) fn pixel_bytes(features: bool, orders: usize, splats: bool, parts: usize) -> usize {
+    let lanes = size_of::<[i128; 3]>();
+    let of_tile = size_of::<TileSums>() + parts * size_of::<((usize, u32), Part)>();
+    size_of::<Pixel>()
+        + usize::from(features) * size_of::<FeatureSums>()
+        + 2 * orders * lanes
+        + usize::from(splats) * (2 * lanes + size_of::<[Squares; 3]>())
+        + parts * lanes
+        + of_tile.div_ceil((TILE * TILE) as usize)
 }
 
 /// The sums of a whole image.

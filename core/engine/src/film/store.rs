@@ -1,7 +1,7 @@
 //! Films in checkpoints.
 
 use super::coverage::Coverage;
-use super::fixed::Squares;
+use super::fixed::{MOST_SAMPLES, Squares};
 use super::tile::{self, Part};
 use super::{FeatureSums, Film, orders, splat};
 use crate::checkpoint::sections::{Fields, Reader, Writer};
@@ -13,8 +13,6 @@ const PIXEL: usize = 64 + SQUARES;
 const FEATURES: usize = 120;
 const SPLATS: usize = 48 + SQUARES;
 const SQUARES: usize = 72;
-/// Samples that there can be: a checkpoint that says it has more is damaged.
-const MOST_SAMPLES: u32 = 1 << 31;
 
 fn put(out: &mut Vec<u8>, values: &[i128]) {
     for v in values {
@@ -152,8 +150,8 @@ impl Film {
             let mut coverage = Coverage::default();
             for _ in 0..f.u32()? {
                 let (begin, end) = (f.u32()?, f.u32()?);
-                let fits = begin < end && end <= MOST_SAMPLES;
-                if !fits || coverage.insert(begin..end).is_err() {
+                // As they are written: rising, with gaps between them.
+                if end > MOST_SAMPLES || !coverage.push(begin..end) {
                     return Err(format!("tile {i} cannot have samples {begin}..{end}"));
                 }
             }
@@ -171,10 +169,13 @@ impl Film {
     fn read_parts(&mut self, mut f: Fields) -> Result<(), String> {
         let mut wanted = BTreeSet::new();
         for (i, t) in self.tiles.iter().enumerate() {
+            let mut last = None;
             for r in t.coverage().ranges() {
-                let ends = [r.start, r.end - 1].map(nets::around);
-                for net in ends {
-                    if !t.coverage().missing(net.clone()).is_empty() {
+                for net in [r.start, r.end - 1].map(nets::around) {
+                    // A net is looked at once, however many ranges cut it.
+                    if last.replace(net.start) != Some(net.start)
+                        && !t.coverage().missing(net.clone()).is_empty()
+                    {
                         wanted.insert((i, net.start));
                     }
                 }

@@ -1,6 +1,7 @@
 //! Tests of the film.
 
 use super::*;
+use crate::checkpoint::sections::Writer;
 use crate::checkpoint::{Checkpoint, State};
 use resolvent_api::Spectrum;
 use resolvent_api::abi::PixelSample;
@@ -177,4 +178,111 @@ fn checkpoints_bring_everything_back() {
         );
         assert!(read.state.to_bytes(&read.identity, &read.about) == written);
     }
+}
+
+/// A checkpoint's samples rise and leave gaps, as they are written. Files with very many ranges take no longer than they are long.
+#[test]
+fn ranges_are_read_in_order() {
+    const COUNT: u32 = 300_000;
+    let read = |tiles: &[u8], parts: &[u8]| {
+        let mut out = Writer::new(br#"{"window": [0, 0, 1, 1], "halves": 1, "counters": []}"#);
+        out.section("pixels", |out| out.resize(out.len() + 136, 0));
+        out.section("tiles", |out| out.extend_from_slice(tiles));
+        out.section("parts", |out| out.extend_from_slice(parts));
+        Checkpoint::from_bytes(&out.finish()).err().unwrap()
+    };
+    let tiles = |ranges: &mut dyn Iterator<Item = Range<u32>>| {
+        let (mut bytes, mut count, mut samples) = (Vec::new(), 0u32, 0u64);
+        for r in ranges {
+            bytes.extend([r.start.to_le_bytes(), r.end.to_le_bytes()].concat());
+            count += 1;
+            samples += u64::from(r.end - r.start);
+        }
+        let pieces = [1u64, samples].map(u64::to_le_bytes).concat();
+        [&pieces, &count.to_le_bytes()[..], &bytes, &[0; 120]].concat()
+    };
+    let start = std::time::Instant::now();
+    let falling = tiles(&mut (0..COUNT).rev().map(|i| 8 * i..8 * i + 1));
+    let why = read(&falling, &[]);
+    assert!(why.contains("cannot have samples"), "{why}");
+    for wrong in [
+        [4..8, 8..12],
+        [4..8, 7..12],
+        [4..8, 4..4],
+        [4..8, 9..MOST_SAMPLES + 1],
+    ] {
+        let why = read(&tiles(&mut wrong.iter().cloned()), &[]);
+        assert!(why.contains("cannot have samples"), "{wrong:?}: {why}");
+    }
+    let rising = tiles(&mut (0..COUNT).map(|i| 8 * i..8 * i + 1));
+    let why = read(&rising, &[]);
+    assert!(
+        why.contains("misses its part of the net from sample 0"),
+        "{why}"
+    );
+    let seconds = start.elapsed().as_secs_f64();
+    println!("{seconds} s");
+    assert!(seconds < 2.0, "{seconds} s");
+}
+
+/// What squares cannot carry is unknown, not zero.
+#[test]
+fn faint_pictures_have_no_error() {
+    let with = |exposure: f32, halves: bool| {
+        let mut film = match halves {
+            true => Film::in_halves(WINDOW, false),
+            false => Film::new(WINDOW, false),
+        };
+        for (rect, number) in film.tiles().flat_map(|r| (0..4).map(move |n| (r, n))) {
+            let samples = nets::nth(number);
+            let mut b = Buffer::new(rect.min, rect.max, samples.clone(), false);
+            for (x, y) in (rect.min[1]..rect.max[1])
+                .flat_map(|y| (rect.min[0]..rect.max[0]).map(move |x| (x, y)))
+            {
+                for i in samples.clone() {
+                    let key = u64::from(x) << 40 | u64::from(y) << 20 | u64::from(i);
+                    let sample = PixelSample {
+                        radiance: Spectrum::splat(exposure * Stream::new(mix(key)).uniform()),
+                        ..PixelSample::default()
+                    };
+                    b.add(x, y, &sample).unwrap();
+                }
+            }
+            film.half(number % 2 == 1).merge(b, &BOX).unwrap();
+        }
+        film
+    };
+    let truth = with(1.0, true).errors().unwrap().picture;
+    let mut widths = Vec::new();
+    for halves in [false, true] {
+        // Powers of two, which change no bit but the exponent's: 1.2e-10, 7.3e-12, 5.6e-17 and 4.3e-19.
+        for (exponent, faint) in [(-32, false), (-36, true), (-53, true), (-60, true)] {
+            let film = with(2f32.powi(exponent), halves);
+            assert_eq!(film.is_faint(), faint);
+            assert_eq!(film.errors().is_none(), faint);
+            let interval = film.interval().unwrap();
+            assert!(interval.half_width.iter().all(|h| h.is_nan() == faint));
+            assert!(
+                film.half_widths()
+                    .iter()
+                    .flatten()
+                    .all(|h| h.is_nan() == faint)
+            );
+            // The mean is good for much less.
+            let mean = 2f64.powi(-exponent) * film.interval().unwrap().mean[0];
+            assert!((mean - 0.5).abs() < 0.01, "{mean}");
+            if let Some(e) = film.errors() {
+                assert!((e.picture / truth - 1.0).abs() < if halves { 1e-3 } else { 0.1 });
+                widths.push(interval.half_width[0] / interval.mean[0]);
+            }
+        }
+        // Black is known.
+        let black = with(0.0, halves);
+        assert!(!black.is_faint());
+        assert_eq!(black.errors().unwrap().picture, 0.0);
+        assert_eq!(black.interval().unwrap().half_width, [0.0; 3]);
+    }
+    let bright = with(1.0, true).interval().unwrap();
+    let width = bright.half_width[0] / bright.mean[0];
+    assert!((widths[1] / width - 1.0).abs() < 1e-3, "{widths:?} {width}");
 }

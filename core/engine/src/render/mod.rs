@@ -14,10 +14,11 @@ pub(crate) use adaptive::tests::unfinished;
 
 use crate::checkpoint::State;
 use crate::error::{Error, Result};
-use crate::film::Film;
+use crate::film::{self, Film, TOO_FAINT};
 use crate::plugin::ForeignIntegrator;
 use crate::scene::{Counters, Scene};
 use job::Job;
+use resolvent_pathspace::nets;
 use serde_json::Value;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -52,6 +53,26 @@ pub struct Settings {
     /// Layers of light by scattering order; layer k has the light scattered k times, the last one all that was scattered more
     /// often. 0: none.
     pub orders: usize,
+}
+
+impl Settings {
+    /// Bytes of memory that the sums take; `splats`: with light from walks that started at lights.
+    pub fn film_bytes(&self, splats: bool) -> u64 {
+        let (halves, parts) = match self.goal {
+            Goal::Error(_) => (2, 1),
+            _ => (1, parts_of_nets(&self.samples)),
+        };
+        let [x0, y0, x1, y1] = self.window;
+        let pixels = u64::from(x1 - x0) * u64::from(y1 - y0);
+        pixels * (halves * film::pixel_bytes(self.features, self.orders, splats, parts)) as u64
+    }
+}
+
+/// How many nets a range, which is not empty, has only in part.
+fn parts_of_nets(samples: &Range<u32>) -> usize {
+    let (first, last) = (nets::around(samples.start), nets::around(samples.end - 1));
+    let (front, back) = (first.start < samples.start, samples.end < last.end);
+    usize::from(front) + usize::from(back) - usize::from(front && back && first == last)
 }
 
 /// How far a render has come.
@@ -172,6 +193,11 @@ pub fn go_on(
             rendered: (!rendered.film.is_empty()).then(|| Box::new(rendered)),
         })),
     }
+}
+
+/// Why a render to an error that cannot be told ends.
+fn too_faint() -> String {
+    format!("{TOO_FAINT}, or ask for a number of samples instead of an error")
 }
 
 /// The state in which a render begins.

@@ -49,6 +49,10 @@ pub fn run(job: &Job) -> bool {
         let errors = state.film.errors();
         match (job.settings.goal, errors) {
             (Goal::Error(goal), Some(e)) if e.worst_tile <= goal => return true,
+            (Goal::Error(_), None) if state.film.is_faint() => {
+                job.fail(super::too_faint());
+                return false;
+            }
             (Goal::Error(_), _) => error = errors.map(|e| e.worst_tile),
             _ => error = errors.map(|e| e.picture),
         }

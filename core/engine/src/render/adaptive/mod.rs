@@ -179,6 +179,10 @@ pub fn run(job: &Job, goal: f64) -> bool {
             let mut state = job.state();
             let state = &mut *state;
             let Some(a) = &state.adaptive else { break };
+            if a.round >= FIRST && state.film.is_faint() {
+                job.fail(super::too_faint());
+                return false;
+            }
             let left = a.left();
             if left == 0 || nets::nth(2 * a.round + 1).end > job.settings.samples.end {
                 return true;

@@ -62,6 +62,11 @@ impl Adaptive {
             };
             let window = [min[0], min[1], max[0], max[1]];
             let probe = Film::read(&prefix(tile, second), window, false, from)?;
+            if probe.orders() > 0 || probe.has_splats() {
+                return Err(format!(
+                    "is damaged: tile {tile} has layers beside the picture"
+                ));
+            }
             probes.insert((tile, second), probe);
         }
         let out = Self {

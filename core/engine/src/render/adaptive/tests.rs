@@ -191,3 +191,28 @@ fn tiles_get_what_they_need() {
     assert!(squares.sqrt() < 0.3, "{}", squares.sqrt());
     assert!(most > 500, "{most}");
 }
+
+/// Layers that only one half has, or that a probe has, would be lost or worse.
+#[test]
+fn layers_must_agree() {
+    let why = |state: &State| {
+        let bytes = state.to_bytes(&json!(1), &json!(2));
+        Checkpoint::from_bytes(&bytes).err()
+    };
+    let mut state = begin(TALL, 0.3);
+    state.film = state.film.with_orders(4);
+    assert_eq!(why(&state), None);
+    for other in [0, 2, 9] {
+        let twin = Film::new(TALL, false).with_orders(other);
+        state.film.set_twin(twin);
+        let text = why(&state).unwrap();
+        assert!(text.contains("halves differ"), "{text}");
+    }
+    let mut state = unfinished();
+    assert_eq!(why(&state), None);
+    for probe in state.adaptive.as_mut().unwrap().probes.values_mut() {
+        *probe = probe.clone().with_orders(2);
+    }
+    let text = why(&state).unwrap();
+    assert!(text.contains("has layers"), "{text}");
+}
