@@ -158,8 +158,8 @@ fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
     if !root.animations.is_empty() {
         materials.warn("animations", "the model is shown at rest");
     }
-    let accessors = Accessors::new(root, &buffers);
     let size = bytes.len().saturating_add(buffers.bytes);
+    let accessors = Accessors::new(root, &buffers, size);
     let mut meshes = Meshes::new(root, accessors, size);
     let mut model = Model::default();
     let mut slots: Vec<Option<usize>> = vec![None; root.meshes.len()];

@@ -1,9 +1,14 @@
 //! Damaged files give errors or models: no panic, no hang, no memory beyond reason.
 
 mod common;
+mod memory;
 
-use common::everything;
+use common::{Builder, everything};
 use resolvent_gltf::Model;
+use serde_json::json;
+
+#[global_allocator]
+static ALLOCATOR: memory::Counting = memory::Counting;
 
 /// A small generator (SplitMix64, Steele et al. 2014), so that every run does the same.
 struct Random(u64);
@@ -118,4 +123,84 @@ fn changed_numbers() {
         }
     }
     assert!(read > 300 && refused > 300, "{read} {refused}");
+}
+
+/// Primitives that share vertices take time and memory for their own vertices, not each for all of them.
+#[test]
+fn shared_vertices_are_not_copied_for_each_primitive() {
+    const VERTICES: usize = 60_000;
+    const PRIMITIVES: usize = 400;
+    let mut b = Builder::new();
+    let at = |i: usize| [i as f32, (i * i % 1009) as f32, 1.0];
+    let points: Vec<f32> = (0..VERTICES).flat_map(at).collect();
+    let p = b.floats(&points, 3);
+    let n = b.floats(&vec![1.0; 3 * VERTICES], 3);
+    let primitives: Vec<_> = (0..PRIMITIVES)
+        .map(|k| {
+            let i = b.indices(&[0, 1, 2].map(|c| (k * 149 + c) as u16));
+            json!({"attributes": {"POSITION": p, "NORMAL": n}, "indices": i})
+        })
+        .collect();
+    b.push("meshes", json!({"primitives": primitives}));
+    b.push("nodes", json!({"mesh": 0}));
+    let bytes = b.glb();
+    memory::start();
+    let model = Model::parse(&bytes, "shared.glb").unwrap();
+    // The JSON takes most of it. Every vertex for every primitive would be 2.4 GB.
+    let taken = memory::taken();
+    assert!(taken < 8 * bytes.len(), "{taken} bytes for {}", bytes.len());
+    let shapes = &model.meshes[0].shapes;
+    assert_eq!(shapes.len(), PRIMITIVES);
+    for (k, shape) in shapes.iter().enumerate() {
+        let expected = [0, 1, 2].map(|c| at(k * 149 + c).map(f64::from));
+        assert_eq!(common::mesh(shape).positions, expected);
+        assert_eq!(common::mesh(shape).indices, [[0, 1, 2]]);
+    }
+}
+
+/// Sparse accessors are many at no cost, too.
+#[test]
+fn shared_sparse_elements_are_bounded() {
+    const CHANGES: usize = 50_000;
+    let mut b = Builder::new();
+    let indices: Vec<u8> = (0..CHANGES as u16).flat_map(u16::to_le_bytes).collect();
+    let indices = b.view(&indices);
+    let values = b.view(&vec![0; 12 * CHANGES]);
+    let triangle = b.indices(&[0, 1, 2]);
+    let mut add = |last: usize| {
+        let accessor = b.push(
+            "accessors",
+            json!({
+                "componentType": 5126, "count": last + 1, "type": "VEC3", "min": [0, 0, 0], "max": [0, 0, 0],
+                "sparse": {
+                    "count": CHANGES, "indices": {"bufferView": indices, "componentType": 5123},
+                    "values": {"bufferView": values}
+                }
+            }),
+        );
+        json!({"attributes": {"POSITION": accessor}, "indices": triangle})
+    };
+    let few: Vec<_> = (0..20).map(|_| add(CHANGES)).collect();
+    let many: Vec<_> = (0..1000).map(|_| add(CHANGES)).collect();
+    let short = vec![add(CHANGES - 2)];
+    b.push("nodes", json!({"mesh": 0}));
+    let mut with = |primitives: Vec<serde_json::Value>| {
+        b.json["meshes"] = json!([{"primitives": primitives}]);
+        let model = Model::parse(&b.glb(), "sparse.glb");
+        model.map(|m| m.triangles()).map_err(|e| e.to_string())
+    };
+    assert_eq!(with(few), Ok(20));
+    let error = with(many).unwrap_err();
+    assert!(error.contains("more sparse elements than"), "{error}");
+    let error = with(short).unwrap_err();
+    assert!(
+        error.contains("replaces its element 49999 of 49999"),
+        "{error}"
+    );
+    b.bin[2..4].copy_from_slice(&[0, 0]);
+    let error = b.error();
+    assert!(
+        error.contains("have to increase, and 0 comes before 0"),
+        "{error}"
+    );
 }
