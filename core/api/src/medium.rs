@@ -57,6 +57,16 @@ impl Default for MediumInfo {
     }
 }
 
+/// τ = σ·`length` of a lane, for media in closed form; 0 for a lane without extinction even if the length is infinite.
+#[inline(always)]
+pub fn optical_depth(sigma: f32, length: f64) -> f64 {
+    if sigma == 0.0 {
+        0.0
+    } else {
+        f64::from(sigma) * length
+    }
+}
+
 /// A medium as the host sees it: one call per ray segment.
 pub trait Medium: Send + Sync {
     /// Bounds and facts.

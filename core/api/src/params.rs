@@ -234,12 +234,6 @@ impl<'a> Params<'a> {
             .map(|p| unsafe { p.text.to_owned() })
     }
 
-    /// True if a nested plugin was given.
-    pub fn has_plugin(&self, name: &str) -> bool {
-        self.find(name, ParamKind::Plugin)
-            .is_some_and(|p| !p.header.is_null())
-    }
-
     /// A nested BSDF, if given.
     ///
     /// # Errors

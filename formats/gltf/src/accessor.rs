@@ -1,19 +1,56 @@
 //! Accessors: typed views of buffers, with every bound checked.
+//!
+//! Nothing is decoded before it is asked for: primitives often share vertices, and each takes only its own.
 
-use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::accessor::{self, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{self, Index};
+use std::collections::HashSet;
 
 use crate::buffers::Buffers;
 use crate::error::Fallible;
 
-/// Reads accessors of one model.
+/// What a model may have for each of its bytes, and without any, of things that many of its parts can name at no cost: a small
+/// file must neither become a huge scene nor take forever.
+const PER_BYTE: usize = 16;
+const FREE: usize = 1 << 16;
+
+/// Most such things in a model of a size in bytes.
+pub(crate) fn allowance(bytes: usize) -> usize {
+    bytes.saturating_mul(PER_BYTE).saturating_add(FREE)
+}
+
+/// Finds accessors of one model.
 pub(crate) struct Accessors<'c> {
     root: &'c json::Root,
     buffers: &'c Buffers<'c>,
+    /// Accessors whose sparse indices are known to increase.
+    ordered: HashSet<usize>,
+    /// Sparse indices that may still be looked at to find that out.
+    budget: usize,
 }
 
-/// The elements of an accessor in a buffer.
+/// Elements of one type.
+pub(crate) struct Accessor<'c> {
+    index: usize,
+    kind: Type,
+    component: ComponentType,
+    normalized: bool,
+    count: usize,
+    /// `None`: zeros.
+    dense: Option<Elements<'c>>,
+    sparse: Option<Sparse<'c>>,
+}
+
+/// Elements that are replaced: their indices, which increase (glTF 2.0, §3.6.2.3), and their values.
+struct Sparse<'c> {
+    indices: Elements<'c>,
+    component: ComponentType,
+    values: Elements<'c>,
+}
+
+/// Elements in a buffer.
+#[derive(Clone, Copy)]
 struct Elements<'b> {
     bytes: &'b [u8],
     stride: usize,
@@ -48,9 +85,11 @@ impl<'b> Elements<'b> {
         }
     }
 
-    fn iter(&self) -> impl Iterator<Item = &'b [u8]> {
-        let (bytes, stride, size) = (self.bytes, self.stride, self.size);
-        (0..self.count).map(move |i| bytes.get(i * stride..i * stride + size).unwrap_or_default())
+    /// The bytes of element `i`, which is below `count`.
+    #[inline]
+    fn get(&self, i: usize) -> &'b [u8] {
+        let start = i * self.stride;
+        self.bytes.get(start..start + self.size).unwrap_or_default()
     }
 }
 
@@ -82,123 +121,190 @@ fn number(bytes: &[u8], t: ComponentType, normalized: bool) -> f64 {
     }
 }
 
-impl<'c> Accessors<'c> {
-    pub fn new(root: &'c json::Root, buffers: &'c Buffers<'c>) -> Accessors<'c> {
-        Accessors { root, buffers }
+impl Sparse<'_> {
+    #[inline]
+    fn index(&self, k: usize) -> usize {
+        number(self.indices.get(k), self.component, false) as usize
     }
 
-    /// Vectors of `N` numbers each.
-    pub fn vectors<const N: usize>(&self, index: Index<json::Accessor>) -> Fallible<Vec<[f64; N]>> {
-        let kind = match N {
-            1 => Type::Scalar,
-            2 => Type::Vec2,
-            3 => Type::Vec3,
-            _ => Type::Vec4,
-        };
-        let (flat, _) = self.read(index, kind)?;
-        Ok(flat.as_chunks::<N>().0.to_vec())
-    }
-
-    /// Colours with opacity, 1 if the file gives none; in [0, ∞).
-    pub fn colors(&self, index: Index<json::Accessor>) -> Fallible<Vec<[f64; 4]>> {
-        let accessor = self.root.accessors.get(index.value());
-        let rgb = accessor.is_some_and(|a| matches!(a.type_, Checked::Valid(Type::Vec3)));
-        let mut all: Vec<[f64; 4]> = if rgb {
-            let opaque = |[r, g, b]: [f64; 3]| [r, g, b, 1.0];
-            self.vectors::<3>(index)?.into_iter().map(opaque).collect()
-        } else {
-            self.vectors::<4>(index)?
-        };
-        all.iter_mut().flatten().for_each(|v| *v = v.max(0.0));
-        Ok(all)
-    }
-
-    /// Indices of vertices.
-    pub fn indices(&self, index: Index<json::Accessor>) -> Fallible<Vec<u32>> {
-        let (flat, component) = self.read(index, Type::Scalar)?;
-        match component {
-            ComponentType::U8 | ComponentType::U16 | ComponentType::U32 => {
-                Ok(flat.into_iter().map(|v| v as u32).collect())
+    /// The position of the index `i`.
+    fn find(&self, i: usize) -> Option<usize> {
+        let (mut low, mut high) = (0, self.indices.count);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.index(middle) < i {
+                low = middle + 1;
+            } else {
+                high = middle;
             }
-            other => Err(format!(
-                "accessors[{}]: indices are {other:?}",
-                index.value()
-            )),
+        }
+        (low < self.indices.count && self.index(low) == i).then_some(low)
+    }
+}
+
+impl Accessor<'_> {
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Element `i`, which is below [`Accessor::len`], of `N` finite numbers.
+    #[inline]
+    pub fn vector<const N: usize>(&self, i: usize) -> Fallible<[f64; N]> {
+        let replaced = self
+            .sparse
+            .as_ref()
+            .and_then(|s| s.find(i).map(|k| s.values.get(k)));
+        let bytes = replaced.or_else(|| self.dense.as_ref().map(|d| d.get(i)));
+        let mut out = [0.0; N];
+        let parts = bytes.unwrap_or_default();
+        let parts = parts.chunks_exact(component_bytes(self.component));
+        for (v, b) in out.iter_mut().zip(parts) {
+            *v = number(b, self.component, self.normalized);
+        }
+        if out.iter().any(|v| !v.is_finite()) {
+            return Err(self.wrong("has a value that is infinite or no number"));
+        }
+        Ok(out)
+    }
+
+    /// A colour with opacity, 1 if the file gives none; in [0, ∞).
+    pub fn color(&self, i: usize) -> Fallible<[f64; 4]> {
+        let color = if self.kind == Type::Vec3 {
+            let [r, g, b] = self.vector(i)?;
+            [r, g, b, 1.0]
+        } else {
+            self.vector(i)?
+        };
+        Ok(color.map(|v| v.max(0.0)))
+    }
+
+    fn wrong(&self, what: &str) -> String {
+        format!("accessors[{}]: {what}", self.index)
+    }
+}
+
+impl<'c> Accessors<'c> {
+    /// `bytes` is the size of the model with its buffers.
+    pub fn new(root: &'c json::Root, buffers: &'c Buffers<'c>, bytes: usize) -> Accessors<'c> {
+        Accessors {
+            root,
+            buffers,
+            ordered: HashSet::new(),
+            budget: allowance(bytes),
         }
     }
 
-    fn read(
-        &self,
-        index: Index<json::Accessor>,
-        kind: Type,
-    ) -> Fallible<(Vec<f64>, ComponentType)> {
-        self.checked(index.value(), kind)
+    /// Vectors of one of the types in `kinds`.
+    pub fn get(&mut self, index: Index<json::Accessor>, kinds: &[Type]) -> Fallible<Accessor<'c>> {
+        self.checked(index.value(), kinds)
             .map_err(|what| format!("accessors[{}]: {what}", index.value()))
     }
 
-    fn checked(&self, index: usize, kind: Type) -> Fallible<(Vec<f64>, ComponentType)> {
+    /// Indices of vertices.
+    pub fn indices(&mut self, index: Index<json::Accessor>) -> Fallible<Vec<u32>> {
+        let all = self.get(index, &[Type::Scalar])?;
+        match all.component {
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32 => (0..all.len())
+                .map(|i| all.vector(i).map(|[v]| v as u32))
+                .collect(),
+            other => Err(all.wrong(&format!("indices are {other:?}"))),
+        }
+    }
+
+    fn checked(&mut self, index: usize, kinds: &[Type]) -> Fallible<Accessor<'c>> {
         let a = self.root.accessors.get(index).ok_or("does not exist")?;
-        let (Checked::Valid(component), Checked::Valid(found)) = (&a.component_type, &a.type_)
+        let (Checked::Valid(component), Checked::Valid(kind)) = (&a.component_type, &a.type_)
         else {
             return Err("is of an unknown type".into());
         };
-        let component = component.0;
-        if *found != kind {
-            return Err(format!("is {found:?} where {kind:?} is needed"));
+        let (component, kind) = (component.0, *kind);
+        if !kinds.contains(&kind) {
+            let needed: Vec<_> = kinds.iter().map(|k| format!("{k:?}")).collect();
+            return Err(format!(
+                "is {kind:?} where {} is needed",
+                needed.join(" or ")
+            ));
         }
-        let n = kind.multiplicity();
-        let size = n * component_bytes(component);
+        let size = kind.multiplicity() * component_bytes(component);
         let count = usize::try_from(a.count.0).unwrap_or(usize::MAX);
-        let mut values = match a.buffer_view {
+        let dense = match a.buffer_view {
             Some(view) => {
                 let view = self.buffers.view(view.value())?;
                 let offset = a.byte_offset.map_or(0, |o| o.0);
-                let elements = Elements::new(view, offset, size, count)?;
-                let mut values = Vec::with_capacity(count * n);
-                for bytes in elements.iter() {
-                    let parts = bytes.chunks(component_bytes(component));
-                    values.extend(parts.map(|b| number(b, component, a.normalized)));
-                }
-                values
+                Some(Elements::new(view, offset, size, count)?)
             }
             // Zeros cost no byte of file: there are not more of them than it has bytes.
-            None if count <= self.buffers.bytes => vec![0.0; count * n],
+            None if count <= self.buffers.bytes => None,
             None => return Err(format!("has {count} elements without data")),
         };
-        if let Some(sparse) = &a.sparse {
-            let changes = usize::try_from(sparse.count.0).unwrap_or(usize::MAX);
-            let Checked::Valid(index_type) = &sparse.indices.component_type else {
-                return Err("its sparse indices are of an unknown type".into());
-            };
-            let index_type = match index_type.0 {
-                t @ (ComponentType::U8 | ComponentType::U16 | ComponentType::U32) => t,
-                _ => return Err("its sparse indices are of an unknown type".into()),
-            };
-            let at = Elements::new(
+        let sparse = a
+            .sparse
+            .as_ref()
+            .map(|s| self.sparse(index, s, size, count));
+        Ok(Accessor {
+            index,
+            kind,
+            component,
+            normalized: a.normalized,
+            count,
+            dense,
+            sparse: sparse.transpose()?,
+        })
+    }
+
+    /// What replaces elements of an accessor of `count` elements of `size` bytes.
+    fn sparse(
+        &mut self,
+        accessor: usize,
+        sparse: &accessor::sparse::Sparse,
+        size: usize,
+        count: usize,
+    ) -> Fallible<Sparse<'c>> {
+        let changes = usize::try_from(sparse.count.0).unwrap_or(usize::MAX);
+        let component = match &sparse.indices.component_type {
+            Checked::Valid(t) => t.0,
+            Checked::Invalid => return Err("its sparse indices are of an unknown type".into()),
+        };
+        if !matches!(
+            component,
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+        ) {
+            return Err("its sparse indices are of an unknown type".into());
+        }
+        let out = Sparse {
+            indices: Elements::new(
                 self.buffers.view(sparse.indices.buffer_view.value())?,
                 sparse.indices.byte_offset.0,
-                component_bytes(index_type),
+                component_bytes(component),
                 changes,
-            )?;
-            let new = Elements::new(
+            )?,
+            component,
+            values: Elements::new(
                 self.buffers.view(sparse.values.buffer_view.value())?,
                 sparse.values.byte_offset.0,
                 size,
                 changes,
+            )?,
+        };
+        if self.ordered.insert(accessor) {
+            let left = self.budget.checked_sub(changes);
+            self.budget = left.ok_or(
+                "with it the model has more sparse elements than a file of its size can describe",
             )?;
-            for (at, new) in at.iter().zip(new.iter()) {
-                let at = number(at, index_type, false) as usize;
-                let slot = values.get_mut(at * n..(at + 1) * n);
-                let slot = slot.ok_or_else(|| format!("replaces its element {at} of {count}"))?;
-                let parts = new.chunks(component_bytes(component));
-                for (v, b) in slot.iter_mut().zip(parts) {
-                    *v = number(b, component, a.normalized);
-                }
+            if let Some(k) = (1..changes).find(|&k| out.index(k - 1) >= out.index(k)) {
+                return Err(format!(
+                    "its sparse indices have to increase, and {} comes before {}",
+                    out.index(k - 1),
+                    out.index(k)
+                ));
+            }
+            if let Some(last) = changes.checked_sub(1).map(|k| out.index(k))
+                && last >= count
+            {
+                return Err(format!("replaces its element {last} of {count}"));
             }
         }
-        if values.iter().any(|v| !v.is_finite()) {
-            return Err("has a value that is infinite or no number".into());
-        }
-        Ok((values, component))
+        Ok(out)
     }
 }

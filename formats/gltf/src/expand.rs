@@ -25,6 +25,7 @@ pub fn expand(scene: &mut Scene) -> Result<Vec<String>, Error> {
     let mut expansion = Expansion {
         models: HashMap::new(),
         warnings: Vec::new(),
+        numbers: HashMap::new(),
     };
     let mut shapes = Vec::new();
     for shape in std::mem::take(&mut scene.shapes) {
@@ -44,6 +45,8 @@ pub fn expand(scene: &mut Scene) -> Result<Vec<String>, Error> {
 struct Expansion {
     models: HashMap<String, Arc<Model>>,
     warnings: Vec<String>,
+    /// By a name that was taken, the number of the last one made of it.
+    numbers: HashMap<String, usize>,
 }
 
 impl Expansion {
@@ -59,11 +62,12 @@ impl Expansion {
             return Ok(());
         };
         let model = self.model(scene, file)?;
+        let mut left = model.allowance;
         for mesh in &model.meshes {
             // Emitting copies are lights of their own, so nothing is shared between them.
             let emits = mesh.shapes.iter().any(|s| s.emission.is_some());
             if instances && !emits && mesh.places.len() > 1 {
-                let name = unused(scene, &format!("{file}: {}", mesh.name));
+                let name = self.unused(scene, format!("{file}: {}", mesh.name));
                 scene.prototypes.insert(name.clone(), mesh.shapes.clone());
                 scene
                     .instances
@@ -75,6 +79,22 @@ impl Expansion {
                     }));
                 continue;
             }
+            let copied = (mesh.places.len() - 1).saturating_mul(mesh.triangles());
+            left = left.checked_sub(copied).ok_or_else(|| {
+                let why = if emits {
+                    "it emits, so nothing is shared between them; let one mesh emit, or fewer"
+                } else {
+                    "in a prototype nothing is shared between them; name the model outside of prototypes"
+                };
+                let places = mesh.places.len();
+                Error::invalid(
+                    &scene.resolve(file),
+                    format!(
+                        "the mesh '{}' at {places} places makes more triangles than a file of its size can describe: {why}",
+                        mesh.name
+                    ),
+                )
+            })?;
             for place in &mesh.places {
                 for own in &mesh.shapes {
                     out.push(placed(own, &place.then(transform), &shape));
@@ -82,6 +102,21 @@ impl Expansion {
             }
         }
         Ok(())
+    }
+
+    /// A name that no prototype has. Numbers go on where they ended, so that many meshes may have one name.
+    fn unused(&mut self, scene: &Scene, name: String) -> String {
+        if !scene.prototypes.contains_key(&name) {
+            return name;
+        }
+        let n = self.numbers.entry(name.clone()).or_insert(1);
+        loop {
+            *n += 1;
+            let unused = format!("{name} ({n})");
+            if !scene.prototypes.contains_key(&unused) {
+                return unused;
+            }
+        }
     }
 
     /// The model of a file, read once; its materials are the scene's from then on.
@@ -145,16 +180,6 @@ fn placed(own: &Shape, place: &Transform, given: &Shape) -> Shape {
     }
     shape.priority = given.priority;
     shape
-}
-
-fn unused(scene: &Scene, name: &str) -> String {
-    let mut unused = name.to_owned();
-    let mut n = 1;
-    while scene.prototypes.contains_key(&unused) {
-        n += 1;
-        unused = format!("{name} ({n})");
-    }
-    unused
 }
 
 /// Puts `prefix` before all names of a model.

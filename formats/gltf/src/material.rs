@@ -5,9 +5,10 @@ use resolvent_scene::{
     TextureChannel, TextureFilter, Transform, UvTransform, Value as Param, Wrap,
 };
 use serde_json::Value;
+use std::collections::{HashMap, HashSet};
 
 use crate::error::Fallible;
-use crate::values::{element, extension, index, number, numbers};
+use crate::values::{element, extension, index, number, numbers, short};
 
 /// What a glTF material becomes.
 #[derive(Clone, Default)]
@@ -38,8 +39,9 @@ pub(crate) struct Materials<'c> {
     pub materials: IndexMap<String, Material>,
     pub media: IndexMap<String, Medium>,
     pub warnings: Vec<String>,
+    warned: HashSet<String>,
     /// By index (`None` is the default material) and whether vertices have colours.
-    done: Vec<(Wanted, Converted)>,
+    done: HashMap<Wanted, Converted>,
 }
 
 /// Index of a material, and whether the colours of vertices are factors of its base colour.
@@ -95,7 +97,8 @@ impl<'c> Materials<'c> {
             materials: IndexMap::new(),
             media: IndexMap::new(),
             warnings: Vec::new(),
-            done: Vec::new(),
+            warned: HashSet::new(),
+            done: HashMap::new(),
         }
     }
 
@@ -103,7 +106,7 @@ impl<'c> Materials<'c> {
     /// colours of vertices.
     pub fn get(&mut self, index: Option<usize>, colored: bool) -> Fallible<Converted> {
         let wanted = (index, colored);
-        if let Some((_, c)) = self.done.iter().find(|(w, _)| *w == wanted) {
+        if let Some(c) = self.done.get(&wanted) {
             return Ok(c.clone());
         }
         let none = Value::Object(serde_json::Map::new());
@@ -115,7 +118,7 @@ impl<'c> Materials<'c> {
             None => (&none, "the default material".to_owned()),
         };
         let name = match (index, value.get("name").and_then(Value::as_str)) {
-            (Some(i), Some(name)) => format!("{}material {i} {name}", self.prefix),
+            (Some(i), Some(name)) => format!("{}material {i} {}", self.prefix, short(name)),
             (Some(i), None) => format!("{}material {i}", self.prefix),
             (None, _) => format!("{}default material", self.prefix),
         };
@@ -127,7 +130,7 @@ impl<'c> Materials<'c> {
         let converted = self
             .convert(value, name, colored)
             .map_err(|what| format!("{at}.{what}"))?;
-        self.done.push((wanted, converted.clone()));
+        self.done.insert(wanted, converted.clone());
         Ok(converted)
     }
 
@@ -500,7 +503,7 @@ impl<'c> Materials<'c> {
 
     pub fn warn(&mut self, what: &str, why: &str) {
         let text = format!("{what}: {why}");
-        if !self.warnings.contains(&text) {
+        if self.warned.insert(text.clone()) {
             self.warnings.push(text);
         }
     }

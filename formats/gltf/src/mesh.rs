@@ -1,18 +1,14 @@
 //! Meshes: triangles, strips and fans with their normals and texture coordinates.
 
+use gltf::json;
+use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{self, Index};
 use resolvent_scene::{Geometry, Mesh, Shape};
 
-use crate::accessor::Accessors;
+use crate::accessor::{Accessor, Accessors, allowance};
 use crate::error::Fallible;
 use crate::material::{Converted, Materials};
-
-/// Triangles that a model may have for each of its bytes, and without any: primitives can share their data, and a small file
-/// must not become a huge scene.
-const PER_BYTE: usize = 16;
-const FREE: usize = 1 << 16;
 
 /// Makes shapes of primitives.
 pub(crate) struct Meshes<'c> {
@@ -20,6 +16,56 @@ pub(crate) struct Meshes<'c> {
     accessors: Accessors<'c>,
     /// Triangles that may still be made.
     budget: usize,
+    numbers: Numbers,
+}
+
+/// The vertices of one primitive among those that it may share with others.
+#[derive(Default)]
+struct Numbers {
+    /// By the vertex in the accessor its number in the mesh, [`Numbers::NONE`] for all that are not taken. It serves all
+    /// primitives: each takes time for its own vertices, however many the accessor has.
+    new: Vec<u32>,
+    /// The vertices taken, in the order of their numbers.
+    taken: Vec<u32>,
+}
+
+impl Numbers {
+    const NONE: u32 = u32::MAX;
+
+    /// Numbers the vertices of triangles in the order of their use, out of `count`; the triangles with these numbers.
+    fn take(&mut self, triangles: Vec<[u32; 3]>, count: usize) -> Vec<[u32; 3]> {
+        for old in self.taken.drain(..) {
+            self.new[old as usize] = Self::NONE;
+        }
+        if self.new.len() < count {
+            self.new.resize(count, Self::NONE);
+        }
+        let mut number = |old: u32| {
+            let new = &mut self.new[old as usize];
+            if *new == Self::NONE {
+                *new = self.taken.len() as u32;
+                self.taken.push(old);
+            }
+            *new
+        };
+        triangles.into_iter().map(|t| t.map(&mut number)).collect()
+    }
+
+    /// What an accessor has for the vertices taken.
+    fn of<'c, T>(
+        &self,
+        accessor: Option<&Accessor<'c>>,
+        get: impl Fn(&Accessor<'c>, usize) -> Fallible<T>,
+    ) -> Fallible<Vec<T>> {
+        let Some(accessor) = accessor else {
+            return Ok(Vec::new());
+        };
+        let mut out = Vec::with_capacity(self.taken.len());
+        for old in &self.taken {
+            out.push(get(accessor, *old as usize)?);
+        }
+        Ok(out)
+    }
 }
 
 impl<'c> Meshes<'c> {
@@ -28,7 +74,8 @@ impl<'c> Meshes<'c> {
         Meshes {
             root,
             accessors,
-            budget: bytes.saturating_mul(PER_BYTE).saturating_add(FREE),
+            budget: allowance(bytes),
+            numbers: Numbers::default(),
         }
     }
 
@@ -72,7 +119,7 @@ impl<'c> Meshes<'c> {
         }
         let colors = attribute(Semantic::Colors(0));
         let material = materials.get(p.material.map(|m| m.value()), colors.is_some())?;
-        let positions = self.accessors.vectors::<3>(positions)?;
+        let positions = self.accessors.get(positions, &[Type::Vec3])?;
         let order = match p.indices {
             Some(indices) => self.accessors.indices(indices)?,
             None => {
@@ -92,56 +139,46 @@ impl<'c> Meshes<'c> {
             .budget
             .checked_sub(triangles.len())
             .ok_or("with it the model has more triangles than a file of its size can describe")?;
-        let vectors = |accessor: Option<Index<json::Accessor>>| match accessor {
-            Some(a) => self.accessors.vectors::<3>(a),
-            None => Ok(Vec::new()),
-        };
-        let normals = vectors(attribute(Semantic::Normals))?;
-        let uvs = match attribute(Semantic::TexCoords(material.uv_set)) {
-            Some(a) => self.accessors.vectors::<2>(a)?,
-            None => Vec::new(),
-        };
-        let colors = match colors {
-            Some(a) => self.accessors.colors(a)?,
-            None => Vec::new(),
-        };
-        // Without normals the ones of the file's tangents are not known.
-        let tangents = match attribute(Semantic::Tangents) {
-            Some(a) if material.has_normal_map && !normals.is_empty() => {
-                self.accessors.vectors::<4>(a)?
-            }
-            _ => Vec::new(),
-        };
-        for (name, count) in [
-            ("normals", normals.len()),
-            ("texture coordinates", uvs.len()),
-            ("colours", colors.len()),
-            ("tangents", tangents.len()),
-        ] {
-            if count != 0 && count != positions.len() {
+        let mut beside = |name: &str, semantic: Semantic, kinds: &[Type]| {
+            let Some(accessor) = attribute(semantic) else {
+                return Ok(None);
+            };
+            let found = self.accessors.get(accessor, kinds)?;
+            if found.len() != 0 && found.len() != positions.len() {
                 return Err(format!(
-                    "has {count} {name} for {} vertices",
+                    "has {} {name} for {} vertices",
+                    found.len(),
                     positions.len()
                 ));
             }
-        }
+            Ok(Some(found).filter(|f| f.len() != 0))
+        };
+        let normals = beside("normals", Semantic::Normals, &[Type::Vec3])?;
+        let uvs = Semantic::TexCoords(material.uv_set);
+        let uvs = beside("texture coordinates", uvs, &[Type::Vec2])?;
+        let colors = beside("colours", Semantic::Colors(0), &[Type::Vec3, Type::Vec4])?;
+        // Without normals the ones of the file's tangents are not known.
+        let tangents = if material.has_normal_map && normals.is_some() {
+            beside("tangents", Semantic::Tangents, &[Type::Vec4])?
+        } else {
+            None
+        };
         if triangles.is_empty() {
             return Ok(None);
         }
-        Ok(Some(shape(
-            compact(
-                Mesh {
-                    positions,
-                    normals,
-                    uvs,
-                    colors,
-                    tangents,
-                    ..Mesh::default()
-                },
-                triangles,
-            ),
-            &material,
-        )))
+        let numbers = &mut self.numbers;
+        let indices = numbers.take(triangles, positions.len());
+        let mesh = Mesh {
+            positions: numbers.of(Some(&positions), |a, i| a.vector(i))?,
+            normals: numbers.of(normals.as_ref(), |a, i| a.vector(i))?,
+            // v is turned upwards.
+            uvs: numbers.of(uvs.as_ref(), |a, i| a.vector(i).map(|[u, v]| [u, 1.0 - v]))?,
+            colors: numbers.of(colors.as_ref(), Accessor::color)?,
+            tangents: numbers.of(tangents.as_ref(), |a, i| a.vector(i))?,
+            indices,
+            ..Mesh::default()
+        };
+        Ok(Some(shape(mesh, &material)))
     }
 }
 
@@ -176,30 +213,4 @@ fn triangles(mode: Mode, order: &[u32]) -> Vec<[u32; 3]> {
         },
         _ => order.as_chunks::<3>().0.to_vec(),
     }
-}
-
-/// The mesh with the vertices that its triangles use, in the order of their use: primitives often share one large set. v is turned
-/// upwards.
-fn compact(all: Mesh, triangles: Vec<[u32; 3]>) -> Mesh {
-    const NONE: u32 = u32::MAX;
-    let mut new = vec![NONE; all.positions.len()];
-    let mut mesh = Mesh::default();
-    mesh.indices = triangles
-        .iter()
-        .map(|t| {
-            t.map(|i| {
-                let i = i as usize;
-                if new[i] == NONE {
-                    new[i] = mesh.positions.len() as u32;
-                    mesh.positions.push(all.positions[i]);
-                    mesh.normals.extend(all.normals.get(i));
-                    mesh.uvs.extend(all.uvs.get(i).map(|[u, v]| [*u, 1.0 - v]));
-                    mesh.colors.extend(all.colors.get(i));
-                    mesh.tangents.extend(all.tangents.get(i));
-                }
-                new[i]
-            })
-        })
-        .collect();
-    mesh
 }

@@ -9,15 +9,17 @@ use resolvent_scene::{
 use serde_json::Value;
 use std::path::Path;
 
-use crate::accessor::Accessors;
+use crate::accessor::{Accessors, allowance};
 use crate::buffers::Buffers;
 use crate::container;
 use crate::error::{Error, Fallible};
 use crate::material::Materials;
 use crate::mesh::Meshes;
 use crate::spot::spot;
-use crate::values::{element, extension, number, numbers};
+use crate::values::{element, extension, number, numbers, short};
 
+/// Vertices of meshes at several places that are looked at one by one.
+const MOST_POINTS: usize = 1 << 24;
 /// The largest model file that is read, bytes.
 const MAX_FILE: u64 = 4 << 30;
 
@@ -38,6 +40,8 @@ pub struct Model {
     pub lights: Vec<Light>,
     /// What is in the model and is not shown as it is meant, each with its reason.
     pub warnings: Vec<String>,
+    /// Most triangles that copies of its meshes may have in a scene.
+    pub(crate) allowance: usize,
 }
 
 /// A mesh and its places.
@@ -49,6 +53,17 @@ pub struct ModelMesh {
     pub shapes: Vec<Shape>,
     /// Where nodes put it: mesh to model.
     pub places: Vec<Transform>,
+}
+
+impl ModelMesh {
+    /// Triangles at one place.
+    pub(crate) fn triangles(&self) -> usize {
+        let of = |s: &Shape| match &s.geometry {
+            Geometry::Mesh(m) => m.indices.len(),
+            _ => 0,
+        };
+        self.shapes.iter().map(of).sum()
+    }
 }
 
 /// A camera of the model.
@@ -103,25 +118,34 @@ impl Model {
 
     /// Corners of the box around all shapes; `None` if there are none.
     pub fn bounds(&self) -> Option<[[f64; 3]; 2]> {
-        let mut out: Option<[[f64; 3]; 2]> = None;
-        self.for_each_point(|p| {
-            let b = out.get_or_insert([p, p]);
-            for a in 0..3 {
-                b[0][a] = b[0][a].min(p[a]);
-                b[1][a] = b[1][a].max(p[a]);
-            }
-        });
+        let mut out = None;
+        self.for_each_point(|p| include(&mut out, p));
         out
     }
 
-    /// Calls `f` with every vertex where it is in the model, once for each place of its mesh.
+    /// Calls `f` with every vertex where it is in the model, once for each place of its mesh. Where that would be very many,
+    /// with the corners of the box around the mesh instead: what comes has all vertices in its convex hull.
     pub fn for_each_point(&self, mut f: impl FnMut([f64; 3])) {
+        let mut left = MOST_POINTS;
         for mesh in &self.meshes {
+            let points = || {
+                let meshes = mesh.shapes.iter().filter_map(|s| match &s.geometry {
+                    Geometry::Mesh(m) => Some(m),
+                    _ => None,
+                });
+                meshes.flat_map(|m| &m.positions)
+            };
+            let all = points().count().saturating_mul(mesh.places.len());
+            let enough = mesh.places.len() == 1 || {
+                let rest = left.checked_sub(all);
+                left = rest.unwrap_or(left);
+                rest.is_some()
+            };
+            let corners = if enough { None } else { around(points()) };
             for place in &mesh.places {
-                for shape in &mesh.shapes {
-                    if let Geometry::Mesh(m) = &shape.geometry {
-                        m.positions.iter().for_each(|p| f(place.point(*p)));
-                    }
+                match &corners {
+                    Some(corners) => corners.iter().for_each(|p| f(place.point(*p))),
+                    None => points().for_each(|p| f(place.point(*p))),
                 }
             }
         }
@@ -129,11 +153,7 @@ impl Model {
 
     /// Triangles, those of every place counted.
     pub fn triangles(&self) -> usize {
-        let of = |s: &Shape| match &s.geometry {
-            Geometry::Mesh(m) => m.indices.len(),
-            _ => 0,
-        };
-        let each = |m: &ModelMesh| m.places.len() * m.shapes.iter().map(of).sum::<usize>();
+        let each = |m: &ModelMesh| m.places.len() * m.triangles();
         self.meshes.iter().map(each).sum()
     }
 
@@ -144,12 +164,30 @@ impl Model {
     }
 }
 
+fn include(out: &mut Option<[[f64; 3]; 2]>, p: [f64; 3]) {
+    let b = out.get_or_insert([p, p]);
+    for a in 0..3 {
+        b[0][a] = b[0][a].min(p[a]);
+        b[1][a] = b[1][a].max(p[a]);
+    }
+}
+
+/// Corners of the box around points.
+fn around<'p>(points: impl Iterator<Item = &'p [f64; 3]>) -> Option<[[f64; 3]; 8]> {
+    let mut all = None;
+    points.for_each(|p| include(&mut all, *p));
+    let b = all?;
+    Some(std::array::from_fn(|i| {
+        [b[i & 1][0], b[i >> 1 & 1][1], b[i >> 2][2]]
+    }))
+}
+
 fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
     let container = container::parse(bytes)?;
     let root = &container.root;
     let folder = path.parent().unwrap_or(Path::new(""));
     let buffers = Buffers::read(&container, folder)?;
-    let images = (0..root.images.len()).map(|i| buffers.image(i)).collect();
+    let images = buffers.images();
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let mut materials = Materials::new(&container.raw, format!("{name}: "), images);
     for extension in &container.unknown {
@@ -158,10 +196,13 @@ fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
     if !root.animations.is_empty() {
         materials.warn("animations", "the model is shown at rest");
     }
-    let accessors = Accessors::new(root, &buffers);
     let size = bytes.len().saturating_add(buffers.bytes);
+    let accessors = Accessors::new(root, &buffers, size);
     let mut meshes = Meshes::new(root, accessors, size);
-    let mut model = Model::default();
+    let mut model = Model {
+        allowance: allowance(size),
+        ..Model::default()
+    };
     let mut slots: Vec<Option<usize>> = vec![None; root.meshes.len()];
     for (index, to_world) in nodes(root)? {
         let node = &root.nodes[index];
@@ -179,7 +220,7 @@ fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
         if let Some(skin) = node.skin.map(|s| s.value()) {
             let named = root.skins.get(skin).and_then(|s| s.name.as_deref());
             let what = match named {
-                Some(name) => format!("skin '{name}'"),
+                Some(name) => format!("skin '{}'", short(name)),
                 None => format!("skins[{skin}]"),
             };
             materials.warn(&what, "the mesh is shown in its bind pose");
@@ -198,7 +239,7 @@ fn parse(bytes: &[u8], path: &Path) -> Fallible<Model> {
         let slot = match slot {
             Some(slot) => slot,
             None => {
-                let named = root.meshes[mesh].name.clone();
+                let named = root.meshes[mesh].name.as_deref().map(short);
                 model.meshes.push(ModelMesh {
                     name: named.unwrap_or_else(|| format!("mesh {mesh}")),
                     shapes: meshes.shapes(mesh, &mut materials)?,
@@ -325,7 +366,7 @@ fn view(
     to_world: &Transform,
     materials: &mut Materials,
 ) -> Option<ModelCamera> {
-    let name = camera.name.clone().unwrap_or_else(|| "camera".into());
+    let name = camera.name.as_deref().map_or("camera".into(), short);
     let (Checked::Valid(json::camera::Type::Perspective), Some(p)) =
         (&camera.type_, &camera.perspective)
     else {

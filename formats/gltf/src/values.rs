@@ -59,6 +59,15 @@ pub(crate) fn element<'v>(v: &'v Value, key: &str, index: usize) -> Option<&'v V
     v.get(key)?.get(index)
 }
 
+/// A name from the file, cut off where it is no name any more: parts of a scene name each other, many of them the same one.
+pub(crate) fn short(name: &str) -> String {
+    const MOST: usize = 120;
+    match name.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.to_owned(),
+    }
+}
+
 /// The value of an extension.
 pub(crate) fn extension<'v>(v: &'v Value, name: &str) -> Option<&'v Value> {
     v.get("extensions")?.get(name)

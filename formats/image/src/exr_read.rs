@@ -3,6 +3,7 @@
 //! The `exr` crate allocates whatever the header asks for. So the header is read first and compared with a
 //! budget and with what the file's length can hold.
 
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,7 +16,7 @@ use exr::prelude::{Compression, FlatSamples, ReadChannels, ReadLayers, Vec2, rea
 
 use crate::error::Error;
 use crate::exr_info::{ExrInfo, layer_and_channel};
-use crate::image::Image;
+use crate::image::{Channel, Image, Layer};
 
 /// What reading may cost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -194,6 +195,8 @@ fn pixels(reader: Reader<impl Read + Seek>, path: &Path) -> Result<Image, Error>
         .from_chunks(reader)
         .map_err(|e| Error::exr(path, e))?;
     let mut image = Image::new(info.width, info.height);
+    // Where each layer is, and the names of its channels: a small file may have very many.
+    let mut known: HashMap<String, (usize, HashSet<String>)> = HashMap::new();
     (image.origin, image.full, image.metadata) = (info.origin, info.full, info.metadata);
     for (part, (layer, header)) in decoded.layer_data.into_iter().zip(&headers).enumerate() {
         for channel in layer.channel_data.list {
@@ -209,13 +212,21 @@ fn pixels(reader: Reader<impl Read + Seek>, path: &Path) -> Result<Image, Error>
                     format!("channel {name:?} is not complete"),
                 ));
             }
-            if image.channel(&layer, &name).is_some() {
+            let layers = &mut image.layers;
+            let (at, names) = known.entry(layer.clone()).or_insert_with(|| {
+                layers.push(Layer {
+                    name: layer.clone(),
+                    channels: Vec::new(),
+                });
+                (layers.len() - 1, HashSet::new())
+            });
+            if !names.insert(name.clone()) {
                 return Err(Error::invalid(
                     path,
                     format!("two channels are named {name:?} in layer {layer:?}"),
                 ));
             }
-            image.push(&layer, [(name.as_str(), data)]);
+            layers[*at].channels.push(Channel { name, data });
         }
     }
     image.sort();

@@ -238,3 +238,23 @@ fn what_is_no_exr() {
         "{missing}"
     );
 }
+
+/// More channels and layers than anybody has time to compare with each other.
+#[test]
+fn many_channels() {
+    const CHANNELS: usize = 100_000;
+    for layers in [1, CHANNELS] {
+        let names = (0..CHANNELS).map(|i| format!("l{:06}.c{:06}", i % layers, i / layers));
+        let channel = |name: String| AnyChannel::new(name.as_str(), FlatSamples::F32(vec![1.0]));
+        let channels = AnyChannels::sort(names.map(channel).collect());
+        let image = exr::prelude::Image::from_channels(Vec2(1, 1), channels);
+        let mut bytes = Vec::new();
+        image
+            .write()
+            .non_parallel()
+            .to_buffered(Cursor::new(&mut bytes))
+            .unwrap();
+        let read = Image::parse_exr(&bytes, "many.exr", Limits::default()).unwrap();
+        assert_eq!(read.layers.len(), layers);
+    }
+}

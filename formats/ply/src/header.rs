@@ -1,5 +1,7 @@
 //! The header: format, elements and their properties.
 
+use std::collections::HashSet;
+
 use crate::{Fault, Place, quoted};
 
 /// How the data after the header is written.
@@ -144,6 +146,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
         lines: 0,
     };
     let mut encoding = None;
+    let mut names = HashSet::new();
     loop {
         let rest = &bytes[header.end..];
         header.lines += 1;
@@ -200,7 +203,7 @@ pub(crate) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
                     let reason = format!("element {} has count {}", quoted(name), quoted(count));
                     return Err(fault(reason));
                 };
-                if header.elements.iter().any(|e| e.name == name) {
+                if !names.insert(name) {
                     return Err(fault(format!("a second element {}", quoted(name))));
                 }
                 header.elements.push(Element {

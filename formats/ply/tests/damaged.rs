@@ -331,3 +331,20 @@ fn mutations() {
         "{read} read, {refused} refused"
     );
 }
+
+/// More elements than anybody has time to compare with each other.
+#[test]
+fn many_elements() {
+    const ELEMENTS: usize = 400_000;
+    let good = file("3", "1", "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    let more: String = (0..ELEMENTS)
+        .map(|i| format!("element e{i:06} 0\n"))
+        .collect();
+    let with = |last: &str| good.replace("end_header", &format!("{more}{last}end_header"));
+    assert_eq!(check(with("").as_bytes()).unwrap().indices.len(), 1);
+    let fault = check(with("element e000007 0\n").as_bytes()).unwrap_err();
+    assert!(
+        fault.to_string().contains("a second element \"e000007\""),
+        "{fault}"
+    );
+}

@@ -179,8 +179,13 @@ fn describe(body: &mut Reader<'_>, archive: &Archive, grid: &mut RawGrid) -> Par
     Ok(())
 }
 
+/// As much of a tree's type as a message has room for.
+fn shown(tree: &str) -> String {
+    tree.chars().take(60).collect()
+}
+
 fn unsupported_tree(tree: &str) -> String {
-    let shown: String = tree.chars().take(60).collect();
+    let shown = shown(tree);
     let what = match tree {
         "Tree_ptdataidx32_5_4_3" | "Tree_ptdataidx64_5_4_3" => {
             "a grid of points, which is not a volume; rasterise the points to a float grid"
@@ -234,6 +239,8 @@ pub(crate) fn connect(raw: Vec<RawGrid>, path: &Path) -> Vec<GridInfo> {
                     grid.info.saved_as_half = *half;
                 }
                 Some((_, kind, _)) => {
+                    // Many grids may share one tree: what they say of it has to be short.
+                    let kind = shown(kind);
                     let reason =
                         format!("the grid shares the tree of '{parent}', which is a {kind}");
                     grid.refusal.get_or_insert(fault(reason));

@@ -181,13 +181,22 @@ fn few_lights_have_no_tree() {
     for i in 0..7 {
         let one = mixed(7, 9).swap_remove(i);
         let lights = Lights::new(vec![one], crate::build::BOUNDS, 3);
-        assert!(!lights.has_tree());
         assert_eq!(lights.choose(&at, 0.3, [0.5; 2]), Some((0, 1.0)));
     }
+    // A tree chooses by where the vertex is, power alone does not.
+    let mut s = Stream::new(16);
+    let places: Vec<_> = (0..200).map(|_| point_in(&mut s, 5.0)).collect();
+    let looks = |lights: &Lights, n: usize| {
+        places.iter().any(|&p| {
+            let there = Reference { p, ..at };
+            (0..n as u32).any(|i| lights.probability(&at, i) != lights.probability(&there, i))
+        })
+    };
+    assert!(looks(&with_tree(mixed(20, 1)), 20) && !looks(&by_power(mixed(500, 1)), 500));
     for (n, tree) in [(TREE_FROM - 1, false), (TREE_FROM, true)] {
         let mut all = mixed(n, 1);
         all.extend(distant());
-        assert_eq!(Lights::new(all, crate::build::BOUNDS, 3).has_tree(), tree);
+        assert_eq!(looks(&Lights::new(all, crate::build::BOUNDS, 3), n), tree);
     }
 }
 

@@ -16,7 +16,7 @@ use super::simd::Avx2;
 use super::surface::{Facet, SurfacePoint, offset_origin};
 use super::traverse::{self, Candidate, Start, Tree};
 use super::triangle::Packet;
-use super::two_level::{self, Instances, Placed};
+use super::two_level::{self, Instances};
 
 /// Geometry ready for rays. Queries take `&self`, allocate nothing and may run on any number of threads.
 #[derive(Clone, Debug)]
@@ -223,33 +223,15 @@ impl Accel {
     #[inline]
     pub fn closest(&self, ray: &Ray) -> Option<Hit> {
         if self.instances.is_some() {
-            return self.closest_of_all(ray, |_| true);
+            return self.closest_of_all(ray);
         }
-        self.closest_candidate(ray, |_| true).map(|c| self.hit(&c))
-    }
-
-    /// Nearest hit that `accept` takes. It is asked about hits in no particular order, about some more than once or needlessly.
-    /// A sphere or cylinder whose nearer hit is refused is passed altogether: filters are meant to refuse primitives, not points.
-    #[inline]
-    pub fn closest_with(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        if self.instances.is_some() {
-            return self.closest_of_all(ray, accept);
-        }
-        self.closest_candidate(ray, |c| accept(&self.hit(c)))
-            .map(|c| self.hit(&c))
+        self.closest_candidate(ray).map(|c| self.hit(&c))
     }
 
     /// Whether anything is hit.
     #[inline]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        self.any_candidate(ray, |_| true) || self.occluded_by_instance(ray, |_| true)
-    }
-
-    /// Whether anything is hit that `opaque` says blocks the ray. It is asked in no particular order; see
-    /// [`Self::closest_with`] about spheres and cylinders.
-    #[inline]
-    pub fn occluded_with(&self, ray: &Ray, mut opaque: impl FnMut(&Hit) -> bool) -> bool {
-        self.any_candidate(ray, |c| opaque(&self.hit(c))) || self.occluded_by_instance(ray, opaque)
+        self.any_candidate(ray) || self.occluded_by_instance(ray)
     }
 
     /// The surface at a hit of this `ray`.
@@ -276,61 +258,53 @@ impl Accel {
         placed.unwrap_or_else(|| self.geometry.uv_mirrored(shape, prim))
     }
 
-    /// [`Accel::closest_with`] for a scene with instances: first the shapes that stand by themselves, then the instances up to there.
+    /// [`Accel::closest`] for a scene with instances: first the shapes that stand by themselves, then the instances up to there.
     #[inline(never)]
-    fn closest_of_all(&self, ray: &Ray, mut accept: impl FnMut(&Hit) -> bool) -> Option<Hit> {
-        let loose = self
-            .closest_candidate(ray, |c| accept(&self.hit(c)))
-            .map(|c| self.hit(&c));
+    fn closest_of_all(&self, ray: &Ray) -> Option<Hit> {
+        let loose = self.closest_candidate(ray).map(|c| self.hit(&c));
         let all = self.instances.as_ref()?;
         let setup = RaySetup::new(ray)?;
         let limit = loose.map_or(ray.t_max, |h| h.t);
-        let accept = |p: &Placed| p.at.t < limit && accept(&all.hit(p));
         let placed = match self.kernel {
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2(k) => k.closest_instance(all, ray, &setup, limit, accept),
-            Dispatch::Portable => two_level::closest(Portable, all, ray, &setup, limit, accept),
+            Dispatch::Avx2(k) => k.closest_instance(all, ray, &setup, limit),
+            Dispatch::Portable => two_level::closest(Portable, all, ray, &setup, limit),
         };
         placed.map(|p| all.hit(&p)).or(loose)
     }
 
     #[inline]
-    fn occluded_by_instance(&self, ray: &Ray, opaque: impl FnMut(&Hit) -> bool) -> bool {
-        self.instances.is_some() && self.occluded_by_some(ray, opaque)
+    fn occluded_by_instance(&self, ray: &Ray) -> bool {
+        self.instances.is_some() && self.occluded_by_some(ray)
     }
 
     #[inline(never)]
-    fn occluded_by_some(&self, ray: &Ray, mut opaque: impl FnMut(&Hit) -> bool) -> bool {
+    fn occluded_by_some(&self, ray: &Ray) -> bool {
         let (Some(all), Some(setup)) = (&self.instances, RaySetup::new(ray)) else {
             return false;
         };
-        let opaque = |p: &Placed| opaque(&all.hit(p));
         match self.kernel {
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2(k) => k.occluded_instance(all, ray, &setup, opaque),
-            Dispatch::Portable => two_level::occluded(Portable, all, ray, &setup, opaque),
+            Dispatch::Avx2(k) => k.occluded_instance(all, ray, &setup),
+            Dispatch::Portable => two_level::occluded(Portable, all, ray, &setup),
         }
     }
 
     #[inline(always)]
-    fn closest_candidate(
-        &self,
-        ray: &Ray,
-        accept: impl FnMut(&Candidate) -> bool,
-    ) -> Option<Candidate> {
+    fn closest_candidate(&self, ray: &Ray) -> Option<Candidate> {
         match self.kernel {
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2(k) => k.closest(&self.tree, ray, accept),
-            Dispatch::Portable => closest_portable(&self.tree, ray, accept),
+            Dispatch::Avx2(k) => k.closest(&self.tree, ray),
+            Dispatch::Portable => closest_portable(&self.tree, ray),
         }
     }
 
     #[inline(always)]
-    fn any_candidate(&self, ray: &Ray, opaque: impl FnMut(&Candidate) -> bool) -> bool {
+    fn any_candidate(&self, ray: &Ray) -> bool {
         match self.kernel {
             #[cfg(target_arch = "x86_64")]
-            Dispatch::Avx2(k) => k.occluded(&self.tree, ray, opaque),
-            Dispatch::Portable => occluded_portable(&self.tree, ray, opaque),
+            Dispatch::Avx2(k) => k.occluded(&self.tree, ray),
+            Dispatch::Portable => occluded_portable(&self.tree, ray),
         }
     }
 
@@ -349,16 +323,12 @@ impl Accel {
 
 // Functions of their own: inlined beside the other kernel they cost it registers.
 #[inline(never)]
-fn closest_portable(
-    tree: &Tree,
-    ray: &Ray,
-    accept: impl FnMut(&Candidate) -> bool,
-) -> Option<Candidate> {
+fn closest_portable(tree: &Tree, ray: &Ray) -> Option<Candidate> {
     let ray = RaySetup::new(ray)?;
-    traverse::closest(Portable, tree, &ray, Start::of(&ray), accept)
+    traverse::closest(Portable, tree, &ray, Start::of(&ray), |_| true)
 }
 
 #[inline(never)]
-fn occluded_portable(tree: &Tree, ray: &Ray, opaque: impl FnMut(&Candidate) -> bool) -> bool {
-    RaySetup::new(ray).is_some_and(|ray| traverse::occluded(Portable, tree, &ray, opaque))
+fn occluded_portable(tree: &Tree, ray: &Ray) -> bool {
+    RaySetup::new(ray).is_some_and(|ray| traverse::occluded(Portable, tree, &ray))
 }

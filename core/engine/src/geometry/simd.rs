@@ -24,89 +24,65 @@ impl Avx2 {
 
     /// [`traverse::closest`], compiled for AVX2.
     #[inline(always)]
-    pub fn closest<F: FnMut(&Candidate) -> bool>(
-        self,
-        tree: &Tree,
-        ray: &Ray,
-        accept: F,
-    ) -> Option<Candidate> {
+    pub fn closest(self, tree: &Tree, ray: &Ray) -> Option<Candidate> {
         // SAFETY: `self` proves that AVX2 is available.
-        unsafe { closest_avx2(self, tree, ray, accept) }
+        unsafe { closest_avx2(self, tree, ray) }
     }
 
     /// [`two_level::closest`], compiled for AVX2.
     #[inline(always)]
-    pub fn closest_instance<F: FnMut(&Placed) -> bool>(
+    pub fn closest_instance(
         self,
         all: &Instances,
         ray: &Ray,
         setup: &RaySetup,
         limit: f32,
-        accept: F,
     ) -> Option<Placed> {
         // SAFETY: `self` proves that AVX2 is available.
-        unsafe { closest_instance_avx2(self, all, ray, setup, limit, accept) }
+        unsafe { closest_instance_avx2(self, all, ray, setup, limit) }
     }
 
     /// [`two_level::occluded`], compiled for AVX2.
     #[inline(always)]
-    pub fn occluded_instance<F: FnMut(&Placed) -> bool>(
-        self,
-        all: &Instances,
-        ray: &Ray,
-        setup: &RaySetup,
-        opaque: F,
-    ) -> bool {
+    pub fn occluded_instance(self, all: &Instances, ray: &Ray, setup: &RaySetup) -> bool {
         // SAFETY: `self` proves that AVX2 is available.
-        unsafe { occluded_instance_avx2(self, all, ray, setup, opaque) }
+        unsafe { occluded_instance_avx2(self, all, ray, setup) }
     }
 
     /// [`traverse::occluded`], compiled for AVX2.
     #[inline(always)]
-    pub fn occluded<F: FnMut(&Candidate) -> bool>(self, tree: &Tree, ray: &Ray, opaque: F) -> bool {
+    pub fn occluded(self, tree: &Tree, ray: &Ray) -> bool {
         // SAFETY: `self` proves that AVX2 is available.
-        unsafe { occluded_avx2(self, tree, ray, opaque) }
+        unsafe { occluded_avx2(self, tree, ray) }
     }
 }
 
 // The ray is set up in here, too, so that its constants stay in registers and are made with the same instructions.
 #[target_feature(enable = "avx2")]
-fn closest_avx2<F: FnMut(&Candidate) -> bool>(
-    k: Avx2,
-    tree: &Tree,
-    ray: &Ray,
-    accept: F,
-) -> Option<Candidate> {
+fn closest_avx2(k: Avx2, tree: &Tree, ray: &Ray) -> Option<Candidate> {
     let ray = RaySetup::new(ray)?;
-    traverse::closest(k, tree, &ray, Start::of(&ray), accept)
+    traverse::closest(k, tree, &ray, Start::of(&ray), |_| true)
 }
 
 #[target_feature(enable = "avx2")]
-fn occluded_avx2<F: FnMut(&Candidate) -> bool>(k: Avx2, tree: &Tree, ray: &Ray, opaque: F) -> bool {
-    RaySetup::new(ray).is_some_and(|ray| traverse::occluded(k, tree, &ray, opaque))
+fn occluded_avx2(k: Avx2, tree: &Tree, ray: &Ray) -> bool {
+    RaySetup::new(ray).is_some_and(|ray| traverse::occluded(k, tree, &ray))
 }
 
 #[target_feature(enable = "avx2")]
-fn closest_instance_avx2<F: FnMut(&Placed) -> bool>(
+fn closest_instance_avx2(
     k: Avx2,
     all: &Instances,
     ray: &Ray,
     setup: &RaySetup,
     limit: f32,
-    accept: F,
 ) -> Option<Placed> {
-    two_level::closest(k, all, ray, setup, limit, accept)
+    two_level::closest(k, all, ray, setup, limit)
 }
 
 #[target_feature(enable = "avx2")]
-fn occluded_instance_avx2<F: FnMut(&Placed) -> bool>(
-    k: Avx2,
-    all: &Instances,
-    ray: &Ray,
-    setup: &RaySetup,
-    opaque: F,
-) -> bool {
-    two_level::occluded(k, all, ray, setup, opaque)
+fn occluded_instance_avx2(k: Avx2, all: &Instances, ray: &Ray, setup: &RaySetup) -> bool {
+    two_level::occluded(k, all, ray, setup)
 }
 
 impl Kernel for Avx2 {

@@ -103,16 +103,13 @@ where
     }
 }
 
-/// Whether any hit is `opaque`.
+/// Whether anything is hit.
 #[inline(always)]
-pub(super) fn occluded<K: Kernel, F>(k: K, tree: &Tree, ray: &RaySetup, opaque: F) -> bool
-where
-    F: FnMut(&Candidate) -> bool,
-{
+pub(super) fn occluded<K: Kernel>(k: K, tree: &Tree, ray: &RaySetup) -> bool {
     if 7 * tree.depth < SHALLOW_STACK {
-        occluded_sized::<K, F, SHALLOW_STACK>(k, tree, ray, opaque)
+        occluded_sized::<K, SHALLOW_STACK>(k, tree, ray)
     } else {
-        occluded_sized::<K, F, DEEP_STACK>(k, tree, ray, opaque)
+        occluded_sized::<K, DEEP_STACK>(k, tree, ray)
     }
 }
 
@@ -244,17 +241,8 @@ fn pop<const N: usize>(stack: &[u64; N], height: &mut usize, t_max: f32) -> Opti
 }
 
 #[inline(always)]
-fn occluded_sized<K: Kernel, F, const N: usize>(
-    k: K,
-    tree: &Tree,
-    ray: &RaySetup,
-    mut opaque: F,
-) -> bool
-where
-    F: FnMut(&Candidate) -> bool,
-{
+fn occluded_sized<K: Kernel, const N: usize>(k: K, tree: &Tree, ray: &RaySetup) -> bool {
     let t_max = ray.t_max;
-    let mut blocks = |c: Candidate| c.t < t_max && opaque(&c);
     let mut stack = [0u32; N];
     let mut height = 0;
     let mut current = Child::node(0);
@@ -278,14 +266,7 @@ where
             }
         } else if current.is_quadrics() {
             for quadric in &tree.quadrics[current.items()] {
-                if let Some(t) = quadric.intersect(ray, t_max)
-                    && blocks(Candidate {
-                        t,
-                        prim: quadric.prim,
-                        u: 0.0,
-                        v: 0.0,
-                    })
-                {
+                if quadric.intersect(ray, t_max).is_some_and(|t| t < t_max) {
                     return true;
                 }
             }
@@ -296,12 +277,7 @@ where
                 while mask != 0 {
                     let i = mask.trailing_zeros() as usize & 7;
                     mask &= mask - 1;
-                    if blocks(Candidate {
-                        t: hits.t[i],
-                        prim: packets[i / LANES].prim[i % LANES],
-                        u: hits.u[i],
-                        v: hits.v[i],
-                    }) {
+                    if hits.t[i] < t_max {
                         return true;
                     }
                 }

@@ -193,38 +193,30 @@ fn next<const N: usize>(stack: &[u64; N], height: &mut usize, t_max: f32) -> Opt
     None
 }
 
-/// Nearest accepted hit nearer than `limit`; of hits at equal t the one on the instance and primitive of lowest number.
+/// Nearest hit nearer than `limit`; of hits at equal t the one on the instance and primitive of lowest number.
 #[inline(always)]
-pub(super) fn closest<K: Kernel, F>(
+pub(super) fn closest<K: Kernel>(
     k: K,
     all: &Instances,
     ray: &Ray,
     setup: &RaySetup,
     limit: f32,
-    accept: F,
-) -> Option<Placed>
-where
-    F: FnMut(&Placed) -> bool,
-{
+) -> Option<Placed> {
     if 7 * all.top.depth < SHALLOW_STACK {
-        closest_sized::<K, F, SHALLOW_STACK>(k, all, ray, setup, limit, accept)
+        closest_sized::<K, SHALLOW_STACK>(k, all, ray, setup, limit)
     } else {
-        closest_sized::<K, F, DEEP_STACK>(k, all, ray, setup, limit, accept)
+        closest_sized::<K, DEEP_STACK>(k, all, ray, setup, limit)
     }
 }
 
 #[inline(always)]
-fn closest_sized<K: Kernel, F, const N: usize>(
+fn closest_sized<K: Kernel, const N: usize>(
     k: K,
     all: &Instances,
     ray: &Ray,
     setup: &RaySetup,
     limit: f32,
-    mut accept: F,
-) -> Option<Placed>
-where
-    F: FnMut(&Placed) -> bool,
-{
+) -> Option<Placed> {
     let mut best: Option<Placed> = None;
     let mut reached = limit;
     let mut stack = [0u64; N];
@@ -254,7 +246,7 @@ where
             };
             let found = traverse::closest(k, tree, &inner, from, |c| {
                 let p = placed(c);
-                (p.at.t < reached || (ties && p.at.t == reached)) && accept(&p)
+                p.at.t < reached || (ties && p.at.t == reached)
             });
             if let Some(c) = found {
                 let hit = placed(&c);
@@ -282,18 +274,9 @@ where
     best
 }
 
-/// Whether any hit is `opaque`.
+/// Whether anything is hit.
 #[inline(always)]
-pub(super) fn occluded<K: Kernel, F>(
-    k: K,
-    all: &Instances,
-    ray: &Ray,
-    setup: &RaySetup,
-    mut opaque: F,
-) -> bool
-where
-    F: FnMut(&Placed) -> bool,
-{
+pub(super) fn occluded<K: Kernel>(k: K, all: &Instances, ray: &Ray, setup: &RaySetup) -> bool {
     let mut stack = [0u64; DEEP_STACK];
     stack[0] = entry(setup.t_min, Child::node(0));
     let mut height = 1;
@@ -304,16 +287,7 @@ where
             let Some((tree, inner)) = all.enter(instance, ray, start) else {
                 continue;
             };
-            let hit = traverse::occluded(k, tree, &inner, |c| {
-                opaque(&Placed {
-                    instance,
-                    at: Candidate {
-                        t: c.t + start,
-                        ..*c
-                    },
-                })
-            });
-            if hit {
+            if traverse::occluded(k, tree, &inner) {
                 return true;
             }
             continue;

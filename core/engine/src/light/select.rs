@@ -226,11 +226,6 @@ impl Lights {
         !self.infinite.is_empty()
     }
 
-    /// True if a tree chooses among the lights at finite places.
-    pub fn has_tree(&self) -> bool {
-        self.grove.is_some()
-    }
-
     /// Probability of choosing `light` for `at`.
     #[inline]
     pub fn probability(&self, at: &Reference, light: u32) -> f32 {

@@ -432,6 +432,28 @@ fn empty_leaves_stay_within_the_allowance() {
     assert_eq!(read_everything(&cut), Ok(Outcome::Refused));
 }
 
+/// What is wrong with an instance does not repeat all that its parent says.
+#[test]
+fn many_instances_of_a_parent_of_a_long_type() {
+    let parent = Writer {
+        name: "a",
+        tree: "Tree_".repeat(40_000).leak(),
+        ..Writer::default()
+    };
+    let mut bytes = Writer::header(224, 1001, true);
+    parent.grid(&mut bytes, "");
+    for _ in 0..1000 {
+        Writer::default().grid(&mut bytes, "a");
+    }
+    assert_eq!(read_everything(&bytes), Ok(Outcome::Refused));
+    let file = File::from_bytes("instances.vdb", bytes).unwrap();
+    let refusal = file.grids()[1000].refusal.as_ref().unwrap().to_string();
+    assert!(
+        refusal.contains("the tree of 'a', which is a Tree_Tree_"),
+        "{refusal}"
+    );
+}
+
 #[test]
 fn only_what_is_asked_for_is_read() {
     let path = format!("{}/tests/data/cloud_s.vdb", env!("CARGO_MANIFEST_DIR"));

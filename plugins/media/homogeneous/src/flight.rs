@@ -5,6 +5,7 @@
 //! underflow where it matters, because the hero lane never flies further than 37 mean free paths.
 
 use crate::Homogeneous;
+use resolvent_api::medium::optical_depth;
 use resolvent_api::operator::flight_flags;
 use resolvent_api::rng::{Stream, derive, exponential_fine};
 use resolvent_api::{Event, Flight, FlightDraws, Segment, Spectrum};
@@ -17,16 +18,6 @@ pub struct Part {
     unit: f64,
     /// World length.
     pub length: f64,
-}
-
-/// σ·`length`, 0 for a lane without extinction even if the length is infinite.
-#[inline(always)]
-pub fn optical_depth(sigma: f32, length: f64) -> f64 {
-    if sigma == 0.0 {
-        0.0
-    } else {
-        f64::from(sigma) * length
-    }
 }
 
 /// a·b where nothing times infinity is nothing.

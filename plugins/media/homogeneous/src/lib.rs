@@ -32,7 +32,7 @@ mod flight;
 mod tests;
 
 use resolvent_api::math::DVec3;
-use resolvent_api::medium::medium_traits;
+use resolvent_api::medium::{medium_traits, optical_depth};
 use resolvent_api::{
     Aabb, Coefficients, Decl, Error, Extent, Flight, FlightDraws, Medium, MediumInfo, ParamDecl,
     Params, Plugin, Segment, Spectrum, Vec3,
@@ -137,7 +137,7 @@ impl Medium for Homogeneous {
             Some(part) => self
                 .at
                 .sigma_t
-                .map(|sigma| flight::optical_depth(sigma, part.length) as f32),
+                .map(|sigma| optical_depth(sigma, part.length) as f32),
             None => Spectrum::ZERO,
         }
     }

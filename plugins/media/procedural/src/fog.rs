@@ -6,7 +6,7 @@
 
 use crate::Common;
 use resolvent_api::math::DVec3;
-use resolvent_api::medium::medium_traits;
+use resolvent_api::medium::{medium_traits, optical_depth};
 use resolvent_api::rng::exponential_fine;
 use resolvent_api::{
     Aabb, Coefficients, Error, Event, Extent, Flight, FlightDraws, Medium, MediumInfo, Params,
@@ -204,17 +204,7 @@ impl Fog {
     }
 
     fn transmittance(&self, g: f64) -> Spectrum {
-        self.sigma_t.map(|s| (-depth(s, g)).exp() as f32)
-    }
-}
-
-/// σ·`g`, 0 for a lane without extinction whatever `g` is.
-#[inline(always)]
-fn depth(sigma: f32, g: f64) -> f64 {
-    if sigma == 0.0 {
-        0.0
-    } else {
-        f64::from(sigma) * g
+        self.sigma_t.map(|s| (-optical_depth(s, g)).exp() as f32)
     }
 }
 
@@ -261,7 +251,7 @@ impl Medium for Fog {
         match self.part(s) {
             Some(part) => {
                 let g = part.amount(part.length);
-                self.sigma_t.map(|sigma| depth(sigma, g) as f32)
+                self.sigma_t.map(|sigma| optical_depth(sigma, g) as f32)
             }
             None => Spectrum::ZERO,
         }

@@ -7,7 +7,7 @@ use crate::channel::{Channel, local_shift};
 use crate::coarse::Coarse;
 use crate::cursor::ToLocal;
 use crate::field::VdbField;
-use crate::index::{Found, GROUP, Index, child};
+use crate::index::{Found, GROUP, Index, WIDEST, child};
 use crate::load::{self, Box3, Cover, Loaded, Services, Values, corners, load, union};
 use crate::settings::{Choice, Settings};
 use crate::voxel::each;
@@ -30,6 +30,8 @@ const ROUGH: f32 = 512.0;
 /// for the rest of a vertex: at thickness 6 survival makes 1.6 × the efficiency 1/(variance · time), at 2.4 still 1.2 ×, at 0.8
 /// ratio tracking 1.15 ×. (Eight voxels a look-up instead of one take an eighth off the variance and double the time.)
 const THICK: f32 = 1.5;
+/// Voxels from the origin of index coordinates within which `f64` tells tenths of a voxel apart.
+const FARTHEST: f64 = (1u64 << 48) as f64;
 /// Groups that are made for emission where there is no density; beyond, emission is sampled by larger regions.
 const EMISSION_GROUPS: usize = 1 << 12;
 
@@ -260,19 +262,37 @@ impl Plan<'_> {
             .index_to_world
             .inverse()
             .ok_or_else(|| Error::new("the density grid's transform has no inverse"))?;
+        let s = self.settings;
         let mut all = None;
         let channels = [
-            appearance.temperature.as_ref().map(|t| &t.0),
-            appearance.flame.as_ref().map(|f| &f.0),
+            (
+                &s.temperature,
+                appearance.temperature.as_ref().map(|t| &t.0),
+            ),
+            (&s.flame, appearance.flame.as_ref().map(|f| &f.0)),
         ];
-        for channel in channels.into_iter().flatten() {
+        for (source, channel) in channels {
+            let (Some(source), Some(channel)) = (source, channel) else {
+                continue;
+            };
             let (domain, to_world) = channel.domain();
             let (lo, hi) = corners(domain);
-            let b = bounds(&to_index.after(to_world), lo, hi);
-            let b = [
-                b[0].map(|c| c.floor() as i64),
-                b[1].map(|c| c.ceil() as i64),
-            ];
+            let [lo, hi] = bounds(&to_index.after(to_world), lo, hi);
+            // Before the conversion to integers, which would take infinities and NaN for numbers.
+            let fits = |i: usize| {
+                lo[i].abs().max(hi[i].abs()) <= FARTHEST && hi[i] - lo[i] <= WIDEST as f64
+            };
+            if !(0..3).all(fits) {
+                return Err(Error::new(format!(
+                    "{}: the grid '{}' emits from {lo:?} to {hi:?} in voxels of the density grid '{}' of {}; an axis holds \
+                     {WIDEST} of them, so give both grids transforms of about one scale",
+                    source.file.as_deref().unwrap_or(&s.file),
+                    source.grid,
+                    self.info.unique_name,
+                    s.file,
+                )));
+            }
+            let b = [lo.map(|c| c.floor() as i64), hi.map(|c| c.ceil() as i64)];
             all = Some(all.map_or(b, |a| union(a, b)));
         }
         Ok(all)

@@ -21,6 +21,9 @@ pub const DEFAULT: u32 = UNIFORM;
 /// Bricks in a group.
 pub const GROUP: usize = 512;
 
+/// Most voxels along an axis that coordinates in `f32` resolve.
+pub const WIDEST: i64 = 1 << 22;
+
 /// Where a group is.
 #[derive(Clone, Copy, Debug)]
 pub enum Place {
@@ -76,8 +79,8 @@ impl Index {
     /// # Errors
     /// If the domain is wider than coordinates in `f32` can resolve.
     pub fn new([lo, hi]: [[i64; 3]; 2], count: usize) -> Result<Self, String> {
-        const WIDEST: i64 = 1 << 22;
-        if (0..3).any(|i| hi[i] - lo[i] > WIDEST) {
+        let width = |i: usize| hi[i].checked_sub(lo[i]);
+        if (0..3).any(|i| width(i).is_none_or(|w| !(0..=WIDEST).contains(&w))) {
             return Err(format!(
                 "its voxels from {lo:?} to {hi:?} are spread over more than {WIDEST} voxels along an axis; split it into several grids"
             ));

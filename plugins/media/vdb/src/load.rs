@@ -172,8 +172,12 @@ pub fn load<V: Voxel>(
     let domain = domain.unwrap_or_default();
     let leaves = topology.leaves();
     let count = leaves.len() + topology.tiles().count();
+    let also = match cover.also {
+        Some(_) => " with the emission beside it",
+        None => "",
+    };
     let mut index = Index::new(domain, count)
-        .map_err(|e| Error::new(format!("the grid '{name}' cannot be indexed: {e}")))?;
+        .map_err(|e| Error::new(format!("the grid '{name}'{also} cannot be indexed: {e}")))?;
 
     let faults = Mutex::new(Faults::default());
     let shape = || {

@@ -1,6 +1,7 @@
 //! Emission, colour and their grids.
 
-use super::{data, draws, medium};
+use super::file::Voxels;
+use super::{data, draws, made, medium};
 use crate::Vdb;
 use crate::blackbody::Blackbody;
 use crate::channel::Source;
@@ -79,6 +80,41 @@ fn grids_of_other_files_have_their_own_place() {
         bright += u32::from(a.emission[0] > 0.0);
     }
     assert!(bright > 20, "{bright}");
+}
+
+/// Emission in voxels so large, or so far away, that the density could not be told apart from nothing beside it.
+#[test]
+fn emission_out_of_all_proportion_is_an_error() {
+    let voxels = Voxels::new([0; 3], [8; 3], |_| 1.0);
+    let corpus = data("corpus/multi_fire.vdb").to_string_lossy().into_owned();
+    let with = |scale: f64, offset: f64| {
+        made(&voxels, |s| {
+            s.emission = Spectrum::rgb(1.0, 0.5, 0.1);
+            s.flame = source("flame", 1.0, 0.0);
+            let flame = s.flame.as_mut().unwrap();
+            flame.file = Some(corpus.clone());
+            let row = |i: usize| {
+                let mut row = [0.0, 0.0, 0.0, offset];
+                row[i] = scale;
+                row
+            };
+            flame.transform = Affine::from_rows([row(0), row(1), row(2)]);
+        })
+    };
+    let (m, _) = with(1.0, 0.0).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(m.coefficients(Vec3::splat(4.0)).sigma_t[0], 1.0);
+    for scale in [1e8, 1e13, 1e19, 1e22, 1e60] {
+        let error = with(scale, 0.0).err().unwrap_or_else(|| panic!("{scale}"));
+        for part in [&corpus, "'flame'", "'density' of voxels.vdb", "one scale"] {
+            assert!(error.contains(part), "{scale}: {error}");
+        }
+    }
+    for offset in [1e8, 1e30] {
+        let error = with(1.0, offset)
+            .err()
+            .unwrap_or_else(|| panic!("{offset}"));
+        assert!(error.contains("'density'"), "{offset}: {error}");
+    }
 }
 
 #[test]

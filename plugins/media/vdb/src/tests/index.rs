@@ -150,3 +150,24 @@ fn every_brick_is_found_again() {
         assert!(index.memory() < 4 << 20, "{spread}: {}", index.memory());
     }
 }
+
+/// Widths that no integer of 64 bits holds, too.
+#[test]
+fn domains_that_are_too_wide_are_errors() {
+    let (most, wide) = (i64::MAX, 1 << 22);
+    assert!(Index::new([[0; 3], [wide; 3]], 1).is_ok());
+    for (lo, hi) in [
+        (0, wide + 1),
+        (-most - 1, most),
+        (-1, most),
+        (1, 0),
+        (most, -most),
+    ] {
+        for axis in 0..3 {
+            let mut domain = [[0; 3]; 2];
+            (domain[0][axis], domain[1][axis]) = (lo, hi);
+            let error = Index::new(domain, 1).err().expect("too wide");
+            assert!(error.contains("spread over more than"), "{error}");
+        }
+    }
+}
