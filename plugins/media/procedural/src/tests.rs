@@ -200,6 +200,10 @@ fn parameters() {
             r#"{ "kind": "height_fog", "bounds": [0, -1000, 0, 1, 0, 1] }"#,
             "too dense",
         ),
+        (
+            r#"{ "radius": 1, "sigma_t": [1, 1e9, 1] }"#,
+            "optical thickness",
+        ),
     ] {
         let error = create::<Procedural>(bad).err().unwrap_or_default();
         assert!(error.contains(word), "{bad}: {error}");

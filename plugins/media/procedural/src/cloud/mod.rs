@@ -95,6 +95,9 @@ pub struct Cloud<L> {
     info: MediumInfo,
 }
 
+/// Most null collisions that a flight may meet: it would seem to hang with more.
+const THICKEST: f64 = 1e7;
+
 impl<L: Lanes> Cloud<L> {
     /// Reads the cloud's parameters and finds its bounds, on all of the host's threads.
     pub(crate) fn new(params: &Params<'_>, sigma: L, common: Common) -> Result<Self, Error> {
@@ -110,6 +113,13 @@ impl<L: Lanes> Cloud<L> {
             return Err(Error::new(format!(
                 "the finest layer has {finest:.0} features along the longest edge, more than {FINEST}: \
                  lower 'octaves', 'frequency' or 'lacunarity'"
+            )));
+        }
+        let across = f64::from(common.extent.bounds().extent().length());
+        let thickness = f64::from(common.sigma_t.max_lane()) * across;
+        if !(thickness <= THICKEST) {
+            return Err(Error::new(format!(
+                "'sigma_t' makes an optical thickness of {thickness:.1e} across the cloud's bounds, more than {THICKEST:e}: lower it"
             )));
         }
         let (_, half) = common.extent.object_box();
