@@ -22,6 +22,7 @@ mod overrides;
 mod plugin;
 mod progress;
 mod render;
+mod roles;
 mod sequence;
 mod stats;
 mod system;

@@ -5,6 +5,7 @@ use crate::checkpoint;
 use crate::console;
 use crate::failure::{Code, Outcome, input};
 use crate::output;
+use crate::roles::Roles;
 use crate::stats::{self, About};
 use resolvent_engine::Rendered;
 use resolvent_engine::checkpoint::Checkpoint;
@@ -15,7 +16,15 @@ use std::path::Path;
 pub fn run(a: &Merge) -> Outcome {
     console::set_quiet(a.quiet);
     let targets = output::targets(&a.output, None)?;
+    let mut roles = Roles::default();
+    for file in &a.checkpoints {
+        roles.read("a checkpoint to merge", file)?;
+    }
+    for t in &targets {
+        roles.write("-o", t.path())?;
+    }
     if let Some(file) = &a.checkpoint {
+        roles.write("--checkpoint", file)?;
         output::check_writable(file)?;
     }
     let mut files = a.checkpoints.iter();

@@ -52,9 +52,6 @@ pub fn targets(asked: &[PathBuf], input_file: Option<&Path>) -> Outcome<Vec<Targ
                 )));
             }
         };
-        if targets.iter().any(|t| t.path == path) {
-            return Err(input(format!("-o {} is given twice", path.display())));
-        }
         check_writable(&path)?;
         targets.push(Target { path, format });
     }

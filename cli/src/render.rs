@@ -9,6 +9,7 @@ use crate::interrupt::{self, On, Phase};
 use crate::output::{self, Target};
 use crate::overrides::{self, Plan};
 use crate::progress::Display;
+use crate::roles::Roles;
 use crate::sequence;
 use crate::stats::{self, About, Certainty, Seconds};
 use crate::watch;
@@ -47,16 +48,17 @@ fn one(a: &Render, kind: Kind) -> Outcome {
     // Whoever keeps the sums needs no picture.
     let default = a.aim.checkpoint.is_none().then_some(a.input.as_path());
     let targets = output::targets(&a.output, default)?;
+    let roles = Roles::of_render(a, &targets)?;
     let others = a.stats.iter().chain(&a.save_scene).chain(&a.stage.report);
     for file in others {
         output::check_writable(file)?;
     }
     checkpoint::check(&a.aim)?;
-    with_threads(a.threads.into(), || work(a, kind, &targets)).map_err(input)?
+    with_threads(a.threads.into(), || work(a, kind, &targets, roles)).map_err(input)?
 }
 
 /// Everything that uses threads.
-fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
+fn work(a: &Render, kind: Kind, targets: &[Target], mut roles: Roles) -> Outcome {
     let start = Instant::now();
     let mut seconds = Seconds::default();
     let mut described = describe(a, kind)?;
@@ -67,6 +69,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         registry = registry.copying();
         watch::reads(watch::of_scene(&described, &registry));
     }
+    roles.read_scene(&described, &registry)?;
 
     let built = Scene::build(&described, &registry).map_err(|e| named(a, kind, &e))?;
     let instance = registry
