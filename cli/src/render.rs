@@ -6,7 +6,7 @@ use crate::console;
 use crate::failure::{Code, Failure, Outcome, failed, input};
 use crate::input::Kind;
 use crate::interrupt::{self, On, Phase};
-use crate::output::{self, Target};
+use crate::output::{self, Target, Written};
 use crate::overrides::{self, Plan};
 use crate::progress::Display;
 use crate::roles::Roles;
@@ -128,8 +128,9 @@ fn work(a: &Render, kind: Kind, targets: &[Target], mut roles: Roles) -> Outcome
         ));
     }
     let write_start = Instant::now();
-    if let Some(keeper) = &keeper {
-        keeper.finish(&rendered)?;
+    let mut written = Written::default();
+    if let (Some(keeper), Some(file)) = (&keeper, &a.aim.checkpoint) {
+        written.note(file, keeper.finish(&rendered));
     }
     let (mut image, missing) = output::image(&described, &rendered);
     output::tell_missing(&missing);
@@ -140,7 +141,8 @@ fn work(a: &Render, kind: Kind, targets: &[Target], mut roles: Roles) -> Outcome
         integrator: integrator.title(),
     };
     image.metadata = stats::metadata(&about, &described, &rendered, &certainty);
-    output::write(&a.tone, &image, targets)?;
+    written.image(&a.tone, &image, targets);
+    let summary = format!("{} ({})", written.names(), certainty.summary(&rendered));
     seconds.write = write_start.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
     if let Some(file) = &a.stats {
@@ -154,18 +156,22 @@ fn work(a: &Render, kind: Kind, targets: &[Target], mut roles: Roles) -> Outcome
             seconds,
             certainty: &certainty,
         };
-        stats::write(&run, file)?;
+        written.note(file, stats::write(&run, file));
     }
-    let summary = format!(
-        "{} ({})",
-        output::names(targets, a.aim.checkpoint.as_deref()),
-        certainty.summary(&rendered)
-    );
+    let whole = written.whole(&summary);
     if let Some(Failure { code, message }) = broken {
+        if let Err(e) = whole {
+            let message = format!("{message}; {}", e.message);
+            return Err(Failure { code, message });
+        }
         return Err(Failure {
             code,
             message: format!("{message}; what was finished before is saved in {summary}"),
         });
+    }
+    if let Err(e) = whole {
+        let how = if interrupted { "interrupted; " } else { "" };
+        return Err(failed(format!("{how}{}", e.message)));
     }
     if interrupted {
         // Said even if quiet: the picture is not the one that was asked for.

@@ -1,7 +1,9 @@
 //! Files that are written: none takes the place of another, and none is lost because another cannot be written.
 
-use crate::program::{Run, changed, folder, scene};
+use crate::program::{Run, changed, folder, path, picture, scene};
 use std::path::Path;
+#[cfg(unix)]
+use std::process::Command;
 
 /// What each file of a folder holds.
 fn contents(at: &Path) -> Vec<(std::ffi::OsString, Vec<u8>)> {
@@ -86,4 +88,70 @@ fn no_file_has_two_roles() {
     refused(&at, &convert, &["the input", "-o"]);
     let export = ["export", "scene.json", "-o", "s.usda", "--report", "s.usda"];
     refused(&at, &export, &["-o", "--report"]);
+}
+
+/// The program where files of more than `blocks` of 512 bytes cannot be written.
+#[cfg(unix)]
+fn limited(at: &Path, blocks: usize, args: &[&str]) -> (Option<i32>, String) {
+    // Without its signal the limit is an error like that of a full disk.
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+    let out = Command::new("sh")
+        .args(["-c", &script])
+        .arg(path())
+        .args(args)
+        .current_dir(at)
+        .output()
+        .unwrap_or_else(|e| panic!("{e}"));
+    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    (out.status.code(), said)
+}
+
+/// A checkpoint and pictures that cannot be written are told of, and the rest is written.
+#[test]
+#[cfg(unix)]
+fn a_failure_spares_the_other_files() {
+    let at = folder("spared");
+    let input = scene("bench/surface_only.json");
+    let input = input.to_string_lossy();
+    let size = ["--quiet", "--spp", "4", "--resolution", "64x64"];
+    let files = ["--checkpoint", "k.ckpt", "-o", "a.exr", "-o", "a.png"];
+    let render = [&["render", &input], &size[..], &files].concat();
+    let told = |(code, said): (Option<i32>, String), words: &[&str]| {
+        assert_eq!(code, Some(1), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+        for word in words {
+            assert!(said.contains(word), "{word:?} is not in {said}");
+        }
+    };
+    let there = || ["k.ckpt", "a.exr", "a.png"].map(|f| at.join(f).exists());
+    // Sizes of the three files are far apart, the checkpoint's is the largest and the PNG's the smallest.
+    Run::new(&at, &render).done();
+    let blocks = |f: &str| {
+        let size = std::fs::metadata(at.join(f)).map(|m| m.len() as usize);
+        size.unwrap_or_else(|e| panic!("{e}")).div_ceil(512)
+    };
+    let [most, exr, png] = ["k.ckpt", "a.exr", "a.png"].map(blocks);
+    assert!(most > exr + 1 && exr > png + 1, "{most} {exr} {png}");
+    let whole = picture(&at.join("a.exr"));
+    std::fs::rename(at.join("k.ckpt"), at.join("whole.ckpt")).unwrap_or_else(|e| panic!("{e}"));
+
+    let clear = || ["a.exr", "a.png"].map(|f| drop(std::fs::remove_file(at.join(f))));
+    clear();
+    let words = ["k.ckpt: cannot write", "written is a.exr, a.png"];
+    told(limited(&at, exr + 1, &render), &words);
+    assert_eq!(there(), [false, true, true]);
+    assert!(picture(&at.join("a.exr")).layers == whole.layers);
+
+    clear();
+    let words = ["k.ckpt: ", "a.exr: ", "written is a.png"];
+    told(limited(&at, png + 1, &render), &words);
+    assert_eq!(there(), [false, false, true]);
+    clear();
+    let merge = [&["merge", "whole.ckpt", "-q"], &files[..]].concat();
+    told(limited(&at, png + 1, &merge), &words);
+    assert_eq!(there(), [false, false, true]);
+
+    clear();
+    told(limited(&at, 0, &render), &["a.png: ", "nothing is written"]);
+    assert_eq!(there(), [false; 3]);
 }
