@@ -155,3 +155,58 @@ fn a_failure_spares_the_other_files() {
     told(limited(&at, 0, &render), &["a.png: ", "nothing is written"]);
     assert_eq!(there(), [false; 3]);
 }
+
+/// The exit code and what is said when standard output goes to `out`.
+#[cfg(unix)]
+fn printing_to(at: &Path, out: std::process::Stdio, args: &[&str]) -> (Option<i32>, String) {
+    let mut command = Command::new(path());
+    let out = command.args(args).current_dir(at).stdout(out).output();
+    let out = out.unwrap_or_else(|e| panic!("{e}"));
+    let said = String::from_utf8_lossy(&out.stderr).into_owned();
+    (out.status.code(), said)
+}
+
+/// Results that cannot be printed are no bug of the program; a reader that has gone is nothing to tell.
+#[test]
+#[cfg(target_os = "linux")]
+fn standard_output_that_cannot_be_written() {
+    let at = folder("stdout");
+    let cloud = scene("cloud/cloud_s.vdb");
+    let cloud = cloud.to_string_lossy();
+    Run::new(
+        &at,
+        [
+            "render",
+            &cloud,
+            "-q",
+            "--spp",
+            "1",
+            "--resolution",
+            "8x8",
+            "-o",
+            "a.exr",
+        ],
+    )
+    .done();
+    for args in [
+        &["schema"][..],
+        &["compare", "a.exr", "a.exr"],
+        &["info", &cloud, "--json"],
+        &["plugin", "list"],
+    ] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+        let full = full.unwrap_or_else(|e| panic!("{e}"));
+        let (code, said) = printing_to(&at, full.into(), args);
+        assert_eq!(code, Some(1), "{said}");
+        let start = "error: cannot write to standard output: No space left";
+        assert!(
+            said.starts_with(start) && said.lines().count() == 1,
+            "{said}"
+        );
+
+        let (reader, writer) = std::io::pipe().unwrap_or_else(|e| panic!("{e}"));
+        drop(reader);
+        let (_, said) = printing_to(&at, writer.into(), args);
+        assert_eq!(said, "");
+    }
+}
