@@ -262,8 +262,14 @@ fn render(
     interrupt::enter(Phase::Rendering);
     let stop = &interrupt::STOP;
     let report = |p| display.report(p);
-    let rendered = go_on(from, scene, integrator, &settings, keep, stop, &report);
+    let going_on = keeper.filter(|_| from.is_some());
+    let mut rendered = go_on(from, scene, integrator, &settings, keep, stop, &report);
     display.finish();
+    if let (Some(keeper), Err(broken)) = (going_on, &mut rendered)
+        && broken.rendered.is_none()
+    {
+        broken.error = resolvent_engine::Error::Input(keeper.refused(&broken.error));
+    }
     Ok(rendered)
 }
 
