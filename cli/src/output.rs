@@ -60,10 +60,8 @@ pub fn targets(asked: &[PathBuf], input_file: Option<&Path>) -> Outcome<Vec<Targ
 
 /// Makes sure that a file can be written to a place, without touching what is there.
 pub fn check_writable(path: &Path) -> Outcome<()> {
-    if path.is_dir() {
-        return Err(input(format!("{}: is a folder", path.display())));
-    }
-    let folder = match path.parent() {
+    let file = resolvent_image::destination(path).map_err(input)?;
+    let folder = match file.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };

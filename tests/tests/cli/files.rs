@@ -90,6 +90,52 @@ fn no_file_has_two_roles() {
     refused(&at, &export, &["-o", "--report"]);
 }
 
+/// Where no picture can be is known before it is rendered; where a link leads to it can.
+#[test]
+#[cfg(unix)]
+fn pipes_and_links() {
+    let at = folder("pipes");
+    let input = scene("bench/surface_only.json");
+    let input = input.to_string_lossy();
+    let made = Command::new("mkfifo").arg(at.join("pipe.exr")).status();
+    assert!(made.is_ok_and(|s| s.success()));
+    let link = |to: &str, name: &str| {
+        std::os::unix::fs::symlink(to, at.join(name)).unwrap_or_else(|e| panic!("{e}"));
+    };
+    link("loop.exr", "loop.exr");
+    link("gone/a.exr", "lost.exr");
+    link("/dev/null", "null.json");
+    link("sub/there.exr", "second.exr");
+    link("second.exr", "first.exr");
+    std::fs::create_dir(at.join("sub")).unwrap_or_else(|e| panic!("{e}"));
+    let long = ["render", &input, "-q", "--time", "5"];
+    for (files, words) in [
+        (&["-o", "pipe.exr"][..], ["pipe.exr: ", "a pipe"]),
+        (&["-o", "loop.exr"], ["loop.exr: ", "leads to itself"]),
+        (&["-o", "lost.exr"], ["lost.exr: ", "no folder"]),
+        (
+            &["-o", "a.exr", "--stats", "/dev/null"],
+            ["/dev/null: ", "a device"],
+        ),
+        (&["--checkpoint", "null.json"], ["null.json: ", "a device"]),
+    ] {
+        let run = Run::new(&at, [&long[..], files].concat());
+        assert_eq!(run.code, Some(2), "{run:?}");
+        for word in words {
+            assert!(run.stderr.contains(word), "{word:?} is not in {run:?}");
+        }
+    }
+    let short = ["render", &input, "-q", "--spp", "1", "--resolution", "8x8"];
+    for _ in 0..2 {
+        Run::new(&at, [&short[..], &["-o", "first.exr"]].concat()).done();
+        picture(&at.join("sub/there.exr"));
+        for name in ["first.exr", "second.exr"] {
+            let meta = std::fs::symlink_metadata(at.join(name));
+            assert!(meta.is_ok_and(|m| m.is_symlink()), "{name} was replaced");
+        }
+    }
+}
+
 /// The program where files of more than `blocks` of 512 bytes cannot be written.
 #[cfg(unix)]
 fn limited(at: &Path, blocks: usize, args: &[&str]) -> (Option<i32>, String) {
