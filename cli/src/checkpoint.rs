@@ -76,6 +76,12 @@ impl Keeper {
         Ok(Some(found.state))
     }
 
+    /// Why nothing goes on from it, with what can be done instead.
+    pub fn refused(&self, why: &resolvent_engine::Error) -> String {
+        let name = self.file.display();
+        format!("{name}: {why}; `resolvent merge {name} -o FILE` writes what is there")
+    }
+
     /// Writes it while rendering goes on: if that fails, the next time may be better.
     pub fn save(&self, bytes: &[u8]) {
         if let Err(e) = write(&self.file, bytes) {

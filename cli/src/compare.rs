@@ -4,11 +4,12 @@ use crate::args::Compare;
 use crate::failure::{Code, Outcome, input};
 use resolvent_image::{Comparison, Image, Regions};
 use serde_json::{Value, json};
+use std::path::Path;
 
 /// Runs the command.
 pub fn run(a: &Compare) -> Outcome {
-    let image = Image::read_exr(&a.image).map_err(input)?;
-    let reference = Image::read_exr(&a.reference).map_err(input)?;
+    let image = read(&a.image)?;
+    let reference = read(&a.reference)?;
     let grid = a.regions.0.map(|n| n as usize);
     let c = resolvent_image::compare(&image, &reference, grid).map_err(|e| {
         input(format!(
@@ -33,6 +34,17 @@ pub fn run(a: &Compare) -> Outcome {
     } else {
         Code::Done
     })
+}
+
+fn read(file: &Path) -> Outcome<Image> {
+    // A PNG may be fine; it is no measure of light.
+    if file.is_file() && !crate::input::is_exr(file) {
+        return Err(input(format!(
+            "{}: is no EXR image; compare takes EXR images, whose values are those of the render: write them with -o FILE.exr",
+            file.display()
+        )));
+    }
+    Image::read_exr(file).map_err(input)
 }
 
 fn report(c: &Comparison) -> Value {

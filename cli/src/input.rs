@@ -22,6 +22,8 @@ pub enum Kind {
 
 /// First bytes of OpenVDB files.
 const VDB_MAGIC: [u8; 4] = [0x20, 0x42, 0x44, 0x56];
+/// First bytes of checkpoints.
+const CHECKPOINT_MAGIC: [u8; 4] = *b"RSLV";
 /// First bytes of OpenEXR files.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
@@ -68,9 +70,14 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
         Ok(Kind::Usd)
     } else if first.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
         Ok(Kind::Scene)
+    } else if first == CHECKPOINT_MAGIC {
+        Err(input(format!(
+            "{0}: is a checkpoint; `resolvent merge {0} -o FILE.exr` makes a picture of it",
+            path.display()
+        )))
     } else {
         Err(input(format!(
-            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb) nor a glTF model (.gltf, .glb) nor a USD stage (.usd, .usda, .usdc, .usdz)",
+            "{}: is neither a scene (.json) nor an OpenVDB file (.vdb) nor a glTF model (.gltf, .glb) nor a USD stage (.usd, .usda, .usdc, .usdz) nor an OpenEXR image (.exr)",
             path.display()
         )))
     }

@@ -22,6 +22,7 @@ mod overrides;
 mod plugin;
 mod progress;
 mod render;
+mod roles;
 mod sequence;
 mod stats;
 mod system;
@@ -36,14 +37,18 @@ use failure::Failure;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // A broken pipe (`resolvent info … | head`) ends the program like any other tool, not with a panic.
     std::panic::set_hook(Box::new(|panic| {
-        let text = panic.to_string();
-        if !text.contains("Broken pipe") {
-            eprintln!(
-                "error: internal error, a bug in resolvent: {}",
-                text.replace('\n', " ")
-            );
+        let text = panic.to_string().replace('\n', " ");
+        // `println!` knows no other way to tell that it cannot print. A reader that has had enough (`resolvent info … | head`) is
+        // no error.
+        match text.split_once("failed printing to stdout: ") {
+            Some((_, why)) if why.contains("Broken pipe") => {}
+            Some((_, why)) => {
+                console::line(&format!("error: cannot write to standard output: {why}"))
+            }
+            None => console::line(&format!(
+                "error: internal error, a bug in resolvent: {text}"
+            )),
         }
     }));
     let args = args::Args::parse();
@@ -62,7 +67,7 @@ fn main() -> ExitCode {
     match outcome {
         Ok(Ok(code)) => code.into(),
         Ok(Err(Failure { code, message })) => {
-            eprintln!("error: {message}");
+            console::line(&format!("error: {message}"));
             code.into()
         }
         Err(_) => failure::Code::Failed.into(),

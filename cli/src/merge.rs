@@ -4,7 +4,8 @@ use crate::args::Merge;
 use crate::checkpoint;
 use crate::console;
 use crate::failure::{Code, Outcome, input};
-use crate::output;
+use crate::output::{self, Written};
+use crate::roles::Roles;
 use crate::stats::{self, About};
 use resolvent_engine::Rendered;
 use resolvent_engine::checkpoint::Checkpoint;
@@ -15,7 +16,15 @@ use std::path::Path;
 pub fn run(a: &Merge) -> Outcome {
     console::set_quiet(a.quiet);
     let targets = output::targets(&a.output, None)?;
+    let mut roles = Roles::default();
+    for file in &a.checkpoints {
+        roles.read("a checkpoint to merge", file)?;
+    }
+    for t in &targets {
+        roles.write("-o", t.path())?;
+    }
     if let Some(file) = &a.checkpoint {
+        roles.write("--checkpoint", file)?;
         output::check_writable(file)?;
     }
     let mut files = a.checkpoints.iter();
@@ -37,9 +46,10 @@ pub fn run(a: &Merge) -> Outcome {
         input: about("input"),
         integrator: about("integrator"),
     };
+    let mut written = Written::default();
     if let Some(file) = &a.checkpoint {
         let bytes = all.state.to_bytes(&all.identity, &all.about);
-        checkpoint::write(file, &bytes)?;
+        written.note(file, checkpoint::write(file, &bytes));
     }
     if scene.film.window() != all.state.film.window() {
         let file = first.display();
@@ -56,12 +66,10 @@ pub fn run(a: &Merge) -> Outcome {
     let certainty = stats::Certainty::of(&rendered.film);
     certainty.tell();
     image.metadata = stats::metadata(&about, &scene, &rendered, &certainty);
-    output::write(&a.tone, &image, &targets)?;
-    console::info(format!(
-        "wrote {} ({})",
-        output::names(&targets, a.checkpoint.as_deref()),
-        certainty.summary(&rendered)
-    ));
+    written.image(&a.tone, &image, &targets);
+    let summary = format!("{} ({})", written.names(), certainty.summary(&rendered));
+    written.whole(&summary)?;
+    console::info(format!("wrote {summary}"));
     Ok(Code::Done)
 }
 

@@ -1,7 +1,7 @@
 //! Pictures: checked before rendering, made from the film after it.
 
 use crate::args::{Tone, ToneCurve};
-use crate::failure::{Outcome, failed, input};
+use crate::failure::{Failure, Outcome, failed, input};
 use resolvent_engine::{Rendered, Settings};
 use resolvent_image::{BEAUTY, Curve, Image, ToneMap};
 use resolvent_scene::{Aov, Scene};
@@ -51,9 +51,6 @@ pub fn targets(asked: &[PathBuf], input_file: Option<&Path>) -> Outcome<Vec<Targ
                 )));
             }
         };
-        if targets.iter().any(|t| t.path == path) {
-            return Err(input(format!("-o {} is given twice", path.display())));
-        }
         check_writable(&path)?;
         targets.push(Target { path, format });
     }
@@ -62,10 +59,8 @@ pub fn targets(asked: &[PathBuf], input_file: Option<&Path>) -> Outcome<Vec<Targ
 
 /// Makes sure that a file can be written to a place, without touching what is there.
 pub fn check_writable(path: &Path) -> Outcome<()> {
-    if path.is_dir() {
-        return Err(input(format!("{}: is a folder", path.display())));
-    }
-    let folder = match path.parent() {
+    let file = resolvent_image::destination(path).map_err(input)?;
+    let folder = match file.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
         _ => Path::new("."),
     };
@@ -222,34 +217,57 @@ pub fn tell_missing(missing: &[Aov]) {
     }
 }
 
-/// Writes the picture to all targets.
-pub fn write(a: &Tone, image: &Image, targets: &[Target]) -> Outcome<()> {
-    let tone = ToneMap {
-        exposure: a.exposure as f32,
-        curve: match a.tone_map {
-            ToneCurve::Srgb => Curve::Srgb,
-            ToneCurve::Filmic => Curve::Filmic,
-        },
-    };
-    for t in targets {
-        match t.format {
-            Format::Exr => image.write_exr(&t.path),
-            Format::Png => image.write_png(&t.path, &tone),
-        }
-        .map_err(failed)?;
-    }
-    Ok(())
+/// What became of the files to write: one that fails keeps no other from being written.
+#[derive(Debug, Default)]
+pub struct Written {
+    names: Vec<String>,
+    failures: Vec<String>,
 }
 
-/// The names of the targets, and of a checkpoint, for messages.
-pub fn names(targets: &[Target], checkpoint: Option<&Path>) -> String {
-    let names: Vec<_> = targets
-        .iter()
-        .map(|t| t.path.as_path())
-        .chain(checkpoint)
-        .map(|p| p.display().to_string())
-        .collect();
-    names.join(", ")
+impl Written {
+    /// What came of writing a file.
+    pub fn note(&mut self, file: &Path, outcome: Outcome<()>) {
+        match outcome {
+            Ok(()) => self.names.push(file.display().to_string()),
+            Err(Failure { message, .. }) => self.failures.push(message),
+        }
+    }
+
+    /// Writes the picture to all targets.
+    pub fn image(&mut self, a: &Tone, image: &Image, targets: &[Target]) {
+        let tone = ToneMap {
+            exposure: a.exposure as f32,
+            curve: match a.tone_map {
+                ToneCurve::Srgb => Curve::Srgb,
+                ToneCurve::Filmic => Curve::Filmic,
+            },
+        };
+        for t in targets {
+            let outcome = match t.format {
+                Format::Exr => image.write_exr(&t.path),
+                Format::Png => image.write_png(&t.path, &tone),
+            };
+            self.note(&t.path, outcome.map_err(failed));
+        }
+    }
+
+    /// The names of what is there, for messages.
+    pub fn names(&self) -> String {
+        self.names.join(", ")
+    }
+
+    /// An error that tells all failures, if there are any, and what is there all the same (`summary`).
+    pub fn whole(&self, summary: &str) -> Outcome<()> {
+        if self.failures.is_empty() {
+            return Ok(());
+        }
+        let failures = self.failures.join("; ");
+        Err(failed(if self.names.is_empty() {
+            format!("{failures}; nothing is written")
+        } else {
+            format!("{failures}; written is {summary}")
+        }))
+    }
 }
 
 #[cfg(test)]

@@ -6,9 +6,10 @@ use crate::console;
 use crate::failure::{Code, Failure, Outcome, failed, input};
 use crate::input::Kind;
 use crate::interrupt::{self, On, Phase};
-use crate::output::{self, Target};
+use crate::output::{self, Target, Written};
 use crate::overrides::{self, Plan};
 use crate::progress::Display;
+use crate::roles::Roles;
 use crate::sequence;
 use crate::stats::{self, About, Certainty, Seconds};
 use crate::watch;
@@ -47,16 +48,17 @@ fn one(a: &Render, kind: Kind) -> Outcome {
     // Whoever keeps the sums needs no picture.
     let default = a.aim.checkpoint.is_none().then_some(a.input.as_path());
     let targets = output::targets(&a.output, default)?;
+    let roles = Roles::of_render(a, &targets)?;
     let others = a.stats.iter().chain(&a.save_scene).chain(&a.stage.report);
     for file in others {
         output::check_writable(file)?;
     }
     checkpoint::check(&a.aim)?;
-    with_threads(a.threads.into(), || work(a, kind, &targets)).map_err(input)?
+    with_threads(a.threads.into(), || work(a, kind, &targets, roles)).map_err(input)?
 }
 
 /// Everything that uses threads.
-fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
+fn work(a: &Render, kind: Kind, targets: &[Target], mut roles: Roles) -> Outcome {
     let start = Instant::now();
     let mut seconds = Seconds::default();
     let mut described = describe(a, kind)?;
@@ -67,6 +69,7 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         registry = registry.copying();
         watch::reads(watch::of_scene(&described, &registry));
     }
+    roles.read_scene(&described, &registry)?;
 
     let built = Scene::build(&described, &registry).map_err(|e| named(a, kind, &e))?;
     let instance = registry
@@ -115,8 +118,9 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         ));
     }
     let write_start = Instant::now();
-    if let Some(keeper) = &keeper {
-        keeper.finish(&rendered)?;
+    let mut written = Written::default();
+    if let (Some(keeper), Some(file)) = (&keeper, &a.aim.checkpoint) {
+        written.note(file, keeper.finish(&rendered));
     }
     let (mut image, missing) = output::image(&described, &rendered);
     output::tell_missing(&missing);
@@ -130,7 +134,8 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
         integrator: integrator.title(),
     };
     image.metadata = stats::metadata(&about, &described, &rendered, &certainty);
-    output::write(&a.tone, &image, targets)?;
+    written.image(&a.tone, &image, targets);
+    let summary = format!("{} ({})", written.names(), certainty.summary(&rendered));
     seconds.write = write_start.elapsed().as_secs_f64();
     seconds.total = start.elapsed().as_secs_f64();
     if let Some(file) = &a.stats {
@@ -145,18 +150,22 @@ fn work(a: &Render, kind: Kind, targets: &[Target]) -> Outcome {
             seconds,
             certainty: &certainty,
         };
-        stats::write(&run, file)?;
+        written.note(file, stats::write(&run, file));
     }
-    let summary = format!(
-        "{} ({})",
-        output::names(targets, a.aim.checkpoint.as_deref()),
-        certainty.summary(&rendered)
-    );
+    let whole = written.whole(&summary);
     if let Some(Failure { code, message }) = broken {
+        if let Err(e) = whole {
+            let message = format!("{message}; {}", e.message);
+            return Err(Failure { code, message });
+        }
         return Err(Failure {
             code,
             message: format!("{message}; what was finished before is saved in {summary}"),
         });
+    }
+    if let Err(e) = whole {
+        let how = if interrupted { "interrupted; " } else { "" };
+        return Err(failed(format!("{how}{}", e.message)));
     }
     if interrupted {
         // Said even if quiet: the picture is not the one that was asked for.
@@ -249,8 +258,14 @@ fn render(
     interrupt::enter(Phase::Rendering);
     let stop = &interrupt::STOP;
     let report = |p| display.report(p);
-    let rendered = go_on(from, scene, integrator, settings, keep, stop, &report);
+    let going_on = keeper.filter(|_| from.is_some());
+    let mut rendered = go_on(from, scene, integrator, settings, keep, stop, &report);
     display.finish();
+    if let (Some(keeper), Err(broken)) = (going_on, &mut rendered)
+        && broken.rendered.is_none()
+    {
+        broken.error = resolvent_engine::Error::Input(keeper.refused(&broken.error));
+    }
     Ok(rendered)
 }
 

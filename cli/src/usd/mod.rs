@@ -8,12 +8,14 @@ use python::Python;
 use crate::args::{Convert, Export, Stage};
 use crate::console;
 use crate::failure::{Code, Outcome, failed, input};
+use crate::roles::Roles;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// `resolvent convert`.
 pub fn convert(a: &Convert) -> Outcome {
+    apart(&a.stage, &a.output, &a.options.report)?;
     let python = Python::find()?;
     let mut command = command(&python, &a.stage, &a.output, &a.options);
     if let Some(frames) = &a.options.frames {
@@ -25,6 +27,7 @@ pub fn convert(a: &Convert) -> Outcome {
 
 /// `resolvent export`.
 pub fn export(a: &Export) -> Outcome {
+    apart(&a.scene, &a.output, &a.report)?;
     let python = Python::find()?;
     let mut command = python.command();
     command.arg("-m").arg("resolvent_usd.export").arg(&a.scene);
@@ -34,6 +37,14 @@ pub fn export(a: &Export) -> Outcome {
     }
     report(&mut command, &a.report);
     finish(command, &python, &a.scene)
+}
+
+/// Refuses to write over the input, or one file over the other.
+fn apart(read: &Path, output: &Path, report: &Option<PathBuf>) -> Outcome<()> {
+    let mut roles = Roles::default();
+    roles.read("the input", read)?;
+    roles.write("-o", output)?;
+    report.iter().try_for_each(|r| roles.write("--report", r))
 }
 
 fn report(command: &mut Command, file: &Option<PathBuf>) {

@@ -11,13 +11,14 @@ mod attempt;
 mod files;
 
 pub use attempt::{begin, reads};
-pub use files::of_scene;
+pub use files::{of_parts as files_of_parts, of_scene};
 
 use crate::args::Render;
 use crate::console;
 use crate::failure::{Code, Outcome};
 use crate::interrupt::{self, On};
 use crate::output::{self, Target};
+use crate::roles::Roles;
 use crate::system;
 use attempt::Attempt;
 use files::Files;
@@ -38,6 +39,7 @@ pub fn run(a: &Render) -> Outcome {
     // What no change of a file can mend ends it at once.
     crate::input::of(a)?;
     let targets = output::targets(&a.output, Some(&a.input))?;
+    Roles::of_render(a, &targets)?;
     if let Some(file) = &a.stats {
         output::check_writable(file)?;
     }

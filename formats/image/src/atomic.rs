@@ -7,6 +7,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::error::Error;
 
+/// Links that are followed one after the other: as many as Linux follows.
+const MOST_LINKS: usize = 40;
+
 /// Calls `write` with a new file in the folder of `path`, syncs it to the disk and renames it to `path`.
 ///
 /// If anything fails, the new file is removed and whatever was at `path` stays. After a crash at most a
@@ -16,7 +19,7 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), Error>,
 ) -> Result<(), Error> {
     let path = path.as_ref();
-    let target = target(path)?;
+    let target = destination(path)?;
     let (file, temporary) = create_beside(path, &target)?;
     let guard = RemoveOnDrop(Some(temporary));
     let mut buffered = BufWriter::with_capacity(1 << 16, file);
@@ -32,17 +35,38 @@ pub fn write_atomically(
     Ok(())
 }
 
-/// The file that is meant: where a link leads to.
-fn target(path: &Path) -> Result<PathBuf, Error> {
+/// The file that writing to `path` would replace: where links lead to, whether there is a file yet or not.
+///
+/// # Errors
+/// If it is a folder, a device or a pipe, or a link that leads to itself.
+pub fn destination(path: impl AsRef<Path>) -> Result<PathBuf, Error> {
+    let path = path.as_ref();
     match std::fs::metadata(path) {
-        Ok(found) if found.is_dir() => Err(Error::invalid(path, "is a folder, not a file")),
+        Ok(found) if found.is_dir() => return Err(Error::invalid(path, "is a folder, not a file")),
         Ok(found) if !found.is_file() => {
-            Err(Error::invalid(path, "is a device or a pipe, not a file"))
+            return Err(Error::invalid(path, "is a device or a pipe, not a file"));
         }
-        Ok(_) => std::fs::canonicalize(path).map_err(|source| Error::io(path, "", source)),
-        // Missing, or a link to a missing file: the rename will say if it cannot be.
-        Err(_) => Ok(path.to_path_buf()),
+        Ok(_) => {
+            return std::fs::canonicalize(path).map_err(|source| Error::io(path, "", source));
+        }
+        Err(_) => {}
     }
+    let mut missing = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        match std::fs::read_link(&missing) {
+            Ok(next) => missing = folder_of(&missing).join(next),
+            // Where the folder is missing, too, making the file will say so.
+            Err(_) => {
+                return Ok(
+                    match (folder_of(&missing).canonicalize(), missing.file_name()) {
+                        (Ok(folder), Some(name)) => folder.join(name),
+                        _ => missing,
+                    },
+                );
+            }
+        }
+    }
+    Err(Error::invalid(path, "is a link that leads to itself"))
 }
 
 /// Removes what writers of `path` left that were ended while they wrote it.
@@ -51,11 +75,11 @@ fn target(path: &Path) -> Result<PathBuf, Error> {
 /// stay. Nothing is reported: it is only tidying.
 pub fn remove_leftovers(path: impl AsRef<Path>) {
     let processes = Path::new("/proc");
-    let Ok(target) = target(path.as_ref()) else {
+    let Ok(target) = destination(path) else {
         return;
     };
-    let folder = target.parent().unwrap_or(Path::new(""));
-    let (Some(name), Ok(files)) = (target.file_name(), std::fs::read_dir(display(folder))) else {
+    let (Some(name), Ok(files)) = (target.file_name(), std::fs::read_dir(folder_of(&target)))
+    else {
         return;
     };
     if !processes.join(std::process::id().to_string()).exists() {
@@ -89,7 +113,7 @@ fn create_beside(path: &Path, target: &Path) -> Result<(File, PathBuf), Error> {
     let Some(name) = target.file_name() else {
         return Err(Error::invalid(path, "is not the name of a file"));
     };
-    let folder = target.parent().unwrap_or(Path::new(""));
+    let folder = folder_of(target);
     loop {
         let mut temporary = std::ffi::OsString::from(".");
         let shown = shown(name);
@@ -107,7 +131,7 @@ fn create_beside(path: &Path, target: &Path) -> Result<(File, PathBuf), Error> {
             Err(e) if e.kind() == ErrorKind::NotFound => {
                 return Err(Error::invalid(
                     path,
-                    format!("the folder {:?} does not exist", display(folder)),
+                    format!("the folder {folder:?} does not exist"),
                 ));
             }
             Err(source) => {
@@ -121,19 +145,17 @@ fn create_beside(path: &Path, target: &Path) -> Result<(File, PathBuf), Error> {
     }
 }
 
-fn display(folder: &Path) -> &Path {
-    if folder.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        folder
+/// The folder that a file is in.
+fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
     }
 }
 
 /// The rename itself must survive a power cut. Not all systems can sync folders; the file is safe anyway.
 fn sync_folder(target: &Path) {
-    if let Some(folder) = target.parent()
-        && let Ok(folder) = File::open(display(folder))
-    {
+    if let Ok(folder) = File::open(folder_of(target)) {
         let _ = folder.sync_all();
     }
 }

@@ -39,7 +39,7 @@ mod png;
 mod texels;
 mod tone;
 
-pub use atomic::{remove_leftovers, write_atomically};
+pub use atomic::{destination, remove_leftovers, write_atomically};
 pub use compare::{Comparison, RegionTest, Regions, compare};
 pub use error::Error;
 pub use exr_info::{ChannelInfo, ExrInfo};

@@ -108,6 +108,28 @@ fn renders_go_on() {
     assert!(bits(&picture(&at.join("d.exr"))) == whole);
 }
 
+/// Sums cannot be taken apart: who asks for less than there is hears what is there, and how to have its picture.
+#[test]
+fn fewer_samples_than_are_there() {
+    let at = folder("fewer");
+    let shot = &SHOTS[0];
+    shot.keep(&at, "k.ckpt", &["--spp", "24"]);
+    for (option, value, asked) in [
+        ("--spp", "10", "only 0..10 are"),
+        ("--sample-range", "8..32", "only 8..32 are"),
+    ] {
+        let run = Run::new(&at, shot.args("k.ckpt", &["--resume", option, value]));
+        assert_eq!(run.code, Some(2), "{run:?}");
+        let remedy = "`resolvent merge k.ckpt -o FILE`";
+        for part in ["k.ckpt: ", "has samples 0..24", asked, remedy] {
+            assert!(run.stderr.contains(part), "{part:?} is not in {run:?}");
+        }
+    }
+    merge(&at, &["k.ckpt"], "m.exr").done();
+    let whole = shot.plain(&at, &["--spp", "24"]);
+    assert!(bits(&picture(&at.join("m.exr"))) == whole);
+}
+
 /// A picture cannot be merged, and neither can what is not of one picture: the message says what differs.
 #[test]
 fn what_differs_is_named() {

@@ -231,6 +231,19 @@ fn tools_fail_clearly_too() {
     let not = not.to_string_lossy();
     fails(&at, &["plugin", "info", &not], &["cloud_s.vdb"]);
     fails(&at, &["info", "."], &["is a folder"]);
+    // What is there, and what to do with it, for files of the wrong kind.
+    let input = scene("bench/surface_only.json");
+    let input = input.to_string_lossy();
+    let small = ["--quiet", "--spp", "1", "--resolution", "8x8"];
+    let files = ["-o", "a.exr", "-o", "a.png", "--checkpoint", "a.ckpt"];
+    Run::new(&at, [&["render", &input], &small[..], &files].concat()).done();
+    for args in [["compare", "a.exr", "a.png"], ["compare", "a.png", "a.exr"]] {
+        let words = ["a.png: is no EXR image", "compare takes EXR images"];
+        fails(&at, &args, &words);
+    }
+    fails(&at, &["info", "a.png"], &["a.png", "OpenEXR image (.exr)"]);
+    let words = ["a.ckpt: is a checkpoint", "resolvent merge a.ckpt"];
+    fails(&at, &["info", "a.ckpt"], &words);
 }
 
 /// Light that gets into a body with a hole, filled with what scatters without loss and without end, would never come out: neither would the

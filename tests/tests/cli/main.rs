@@ -4,6 +4,7 @@ mod bench;
 mod checkpoint;
 mod determinism;
 mod errors;
+mod files;
 mod hostile;
 #[cfg(unix)]
 mod interrupt;

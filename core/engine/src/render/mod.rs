@@ -237,11 +237,11 @@ fn check(state: &State, settings: &Settings) -> std::result::Result<(), String> 
         (None, _) => {}
     }
     for i in 0..film.tiles().len() {
-        if let Some(beyond) = film.coverage(i).beyond(&settings.samples) {
-            let Range { start, end } = beyond;
+        let there = film.coverage(i);
+        if there.beyond(&settings.samples).is_some() {
+            let Range { start, end } = settings.samples;
             return Err(format!(
-                "the checkpoint has samples {start}..{end}, and {}..{} are asked for: ask for more",
-                settings.samples.start, settings.samples.end
+                "the checkpoint has samples {there}, and only {start}..{end} are asked for: ask for all of them, or more"
             ));
         }
     }

@@ -45,7 +45,7 @@ impl Scene {
 
     /// A ray of the camera, with the interiors that it starts in.
     #[inline(always)]
-    pub(super) fn from_camera(&self, ray: CameraRay) -> CameraRay {
+    pub(super) fn within(&self, ray: CameraRay) -> CameraRay {
         let same = self.starts.camera;
         CameraRay {
             inside: same.unwrap_or_else(|| self.interiors_at(ray.o.into())),

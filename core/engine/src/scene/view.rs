@@ -225,7 +225,7 @@ unsafe extern "C" fn camera_ray(
     // SAFETY: integrators pass on the table's ctx and valid pointers; the same below.
     unsafe {
         let scene = view(ctx).scene;
-        *out = scene.from_camera(scene.camera.ray(*pixel, *film, *lens));
+        *out = scene.within(scene.camera.ray(*pixel, *film, *lens));
     }
     Status::OK
 }
@@ -352,7 +352,7 @@ unsafe extern "C" fn film_ray(
     // SAFETY: as above.
     unsafe {
         let scene = view(ctx).scene;
-        *out = scene.from_camera(scene.camera.film_ray(*film, *lens));
+        *out = scene.within(scene.camera.film_ray(*film, *lens));
     }
     Status::OK
 }
