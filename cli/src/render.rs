@@ -112,10 +112,12 @@ fn work(a: &Render, kind: Kind, targets: &[Target], mut roles: Roles) -> Outcome
     seconds.render = rendered.seconds;
     warn_about(&rendered, &built);
     let interrupted = rendered.interrupted;
-    if interrupted && stats::total_samples(&rendered) == 0 {
-        return Err(failed(
-            "interrupted before any pixel was finished; nothing is saved",
-        ));
+    if stats::total_samples(&rendered) == 0 {
+        return Err(failed(if interrupted {
+            "interrupted before any pixel was finished; nothing is saved"
+        } else {
+            "the time was over before any pixel was finished; nothing is saved: give more time, or set `max_depth`"
+        }));
     }
     let write_start = Instant::now();
     let mut written = Written::default();

@@ -1,6 +1,6 @@
-//! Ctrl-C.
+//! Ctrl-C, and paths without end.
 
-use crate::program::{folder, path, picture, scene};
+use crate::program::{Run, folder, path, picture, scene};
 use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
@@ -67,4 +67,45 @@ fn the_finished_part_is_saved() {
         let taken: f64 = samples.iter().map(|n| f64::from(*n)).sum();
         assert_eq!(stats["sampling"]["samples"].as_f64(), Some(taken));
     }
+}
+
+/// In the middle of a medium that absorbs nothing and is a million free paths thick a path has no end worth waiting for: neither
+/// Ctrl-C nor the end of the time do, and integrators that keep paths say so.
+#[test]
+fn paths_without_end_are_left() {
+    let at = folder("endless");
+    let scene = r#"{
+        "resolvent": 1,
+        "camera": { "type": "perspective", "origin": [0, 0, 5], "target": [0, 0, 0], "fov_x_deg": 40 },
+        "film": { "resolution": [8, 8] },
+        "lights": [{ "type": "environment", "radiance": 1 }],
+        "media": { "milk": { "plugin": "homogeneous", "params": { "sigma_t": 1, "albedo": 1, "radius": 1e6 } } }
+    }"#;
+    std::fs::write(at.join("s.json"), scene).unwrap_or_else(|e| panic!("{e}"));
+    let start = std::time::Instant::now();
+    let run = Run::new(&at, ["render", "s.json", "-o", "a.exr", "--time", "0.2"]);
+    assert_eq!(run.code, Some(1), "{run:?}");
+    assert!(run.stderr.contains("the time was over"), "{run:?}");
+    let options = ["render", "s.json", "-o", "a.exr", "--integrator", "bdpt"];
+    let run = Run::new(&at, options);
+    assert_eq!(run.code, Some(2), "{run:?}");
+    assert!(run.stderr.contains("max_depth"), "{run:?}");
+    let mut child = Command::new(path())
+        .args(["render", "s.json", "-o", "a.exr"])
+        .current_dir(&at)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap_or_else(|e| panic!("{e}"));
+    let stderr = child.stderr.take().unwrap_or_else(|| panic!("no stderr"));
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    signal("-INT", child.id());
+    let text: Vec<String> = BufReader::new(stderr)
+        .lines()
+        .map_while(Result::ok)
+        .collect();
+    let status = child.wait().unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(status.code(), Some(1), "{text:?}");
+    assert!(text.join(" ").contains("nothing is saved"), "{text:?}");
+    assert!(!at.join("a.exr").exists());
+    assert!(start.elapsed().as_secs() < 30, "{:?}", start.elapsed());
 }

@@ -5,7 +5,7 @@ use crate::harness::{self, Ready};
 use crate::scenes;
 use resolvent_api::VertexKind;
 use resolvent_api::integrator::{Outcome, SceneView};
-use resolvent_engine::scene::View;
+use resolvent_engine::scene::{Until, View};
 use resolvent_pathspace::bidirectional::{Bidirectional, NetDraws, Node};
 use resolvent_pathspace::mis::{Heuristic, MediaDensities};
 use serde_json::json;
@@ -58,7 +58,7 @@ fn room() -> Ready {
 /// carry and weigh, and the weights of a path under all strategies, which sum to 1.
 fn recompute(media: MediaDensities, heuristic: Heuristic, samples: u32) {
     let ready = room();
-    let view = View::new(ready.scene());
+    let view = View::new(ready.scene(), Until::NEVER);
     let table = view.table();
     // SAFETY: the table is complete and outlives its view.
     let scene = unsafe { SceneView::new(&table) };

@@ -15,7 +15,16 @@ pub struct Until<'u> {
     pub deadline: Option<Instant>,
 }
 
+/// No flag that anybody sets.
+static UNSET: AtomicBool = AtomicBool::new(false);
+
 impl Until<'_> {
+    /// Work that goes on until it is done.
+    pub const NEVER: Self = Self {
+        flags: [&UNSET; 2],
+        deadline: None,
+    };
+
     /// True from the moment on that the work is to end.
     pub fn is_now(&self) -> bool {
         self.flags.iter().any(|f| f.load(Ordering::Relaxed))
