@@ -55,10 +55,9 @@ impl Roles {
         self.add(path, file, option, true)
     }
 
-    /// The files that a scene names are read.
+    /// The files that a scene names are read, whatever a text in it may name: no plugin is loaded to tell.
     pub fn read_scene(&mut self, scene: &Scene, registry: &Registry) -> Outcome<()> {
-        let mut files = crate::watch::files_of_parts(scene);
-        files.extend(crate::info::named_files(scene, registry));
+        let files = crate::watch::of_scene(scene, registry);
         let mut files = files.iter();
         files.try_for_each(|file| self.read("a file of the scene", file))
     }

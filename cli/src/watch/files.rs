@@ -100,7 +100,7 @@ fn whole(path: &Path) -> PathBuf {
 }
 
 /// The files that lights, textures, shapes and instances of a scene name, those of models and the tiles of tiled images included.
-pub fn of_parts(scene: &Scene) -> BTreeSet<PathBuf> {
+fn of_parts(scene: &Scene) -> BTreeSet<PathBuf> {
     let mut out = BTreeSet::new();
     for path in crate::info::files_of_parts(scene) {
         if resolvent_gltf::is_model(&path) {

@@ -11,7 +11,7 @@ mod attempt;
 mod files;
 
 pub use attempt::{begin, reads};
-pub use files::{of_parts as files_of_parts, of_scene};
+pub use files::of_scene;
 
 use crate::args::Render;
 use crate::console;
