@@ -57,6 +57,10 @@ impl Roles {
 
     /// The files that a scene names are read, whatever a text in it may name: no plugin is loaded to tell.
     pub fn read_scene(&mut self, scene: &Scene, registry: &Registry) -> Outcome<()> {
+        // What is not there yet cannot be a file that is read.
+        if !self.0.iter().any(|f| f.written && f.path.exists()) {
+            return Ok(());
+        }
         let files = crate::watch::of_scene(scene, registry);
         let mut files = files.iter();
         files.try_for_each(|file| self.read("a file of the scene", file))

@@ -21,7 +21,7 @@ use crate::values::{element, extension, number, numbers, short};
 /// Vertices of meshes at several places that are looked at one by one.
 const MOST_POINTS: usize = 1 << 24;
 /// The largest model file that is read, bytes.
-const MAX_FILE: u64 = 4 << 30;
+pub(crate) const MAX_FILE: u64 = 4 << 30;
 
 /// A glTF model as parts of a scene. Lengths are metres, y is up.
 #[derive(Debug, Clone, Default)]

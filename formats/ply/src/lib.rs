@@ -24,6 +24,8 @@ mod header;
 mod mesh;
 
 use std::fmt;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A triangle mesh. All numbers are finite, all indices refer to positions.
@@ -93,7 +95,7 @@ pub enum PlyError {
 /// Reads a PLY file.
 pub fn read(path: impl AsRef<Path>) -> Result<Mesh, PlyError> {
     let path = path.as_ref();
-    let bytes = std::fs::read(path).map_err(|source| PlyError::Io {
+    let bytes = read_bytes(path).map_err(|source| PlyError::Io {
         path: path.into(),
         source,
     })?;
@@ -101,6 +103,20 @@ pub fn read(path: impl AsRef<Path>) -> Result<Mesh, PlyError> {
         path: path.into(),
         fault,
     })
+}
+
+/// The bytes of a file; of what is no PLY only the first ones.
+fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(std::io::Error::other("is not a regular file"));
+    }
+    let mut bytes = Vec::new();
+    file.by_ref().take(64).read_to_end(&mut bytes)?;
+    if bytes.starts_with(b"ply") {
+        file.read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
 }
 
 /// Reads PLY from memory.

@@ -193,4 +193,6 @@ fn reads_files_and_names_them() {
     std::fs::remove_file(&path).unwrap();
     let error = resolvent_ply::read(&path).unwrap_err().to_string();
     assert!(error.starts_with(&path.display().to_string()), "{error}");
+    let endless = resolvent_ply::read("/dev/zero").unwrap_err().to_string();
+    assert!(endless.contains("not a regular file"), "{endless}");
 }

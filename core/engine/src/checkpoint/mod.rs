@@ -13,8 +13,10 @@ use crate::error::{Error, Result};
 use crate::film::Film;
 use crate::render::{Adaptive, Rendered};
 use crate::scene::Counters;
-use sections::{Reader, Writer};
+use sections::{MAGIC, Reader, Writer};
 use serde_json::{Value, json};
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 /// What a render has done so far.
@@ -125,13 +127,29 @@ impl Rendered {
     }
 }
 
+/// The bytes of a file; of what is no checkpoint only the first ones.
+fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut file = File::open(path)?;
+    if !file.metadata()?.is_file() {
+        return Err(std::io::Error::other("is not a regular file"));
+    }
+    let mut bytes = Vec::new();
+    file.by_ref()
+        .take(MAGIC.len() as u64)
+        .read_to_end(&mut bytes)?;
+    if bytes == MAGIC {
+        file.read_to_end(&mut bytes)?;
+    }
+    Ok(bytes)
+}
+
 impl Checkpoint {
     /// Reads a file. Whatever it holds, the answer is a checkpoint or an error.
     ///
     /// # Errors
     /// If it cannot be read, is none, is damaged, or is of another version.
     pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path)
+        let bytes = read_bytes(path)
             .map_err(|e| Error::Input(format!("{}: cannot read: {e}", path.display())))?;
         Self::from_bytes(&bytes).map_err(|why| Error::Input(format!("{}: {why}", path.display())))
     }

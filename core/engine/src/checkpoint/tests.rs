@@ -153,6 +153,8 @@ fn damage_is_an_error() {
 fn what_is_foreign_is_told_apart() {
     let why = |bytes: &[u8]| Checkpoint::from_bytes(bytes).err().unwrap();
     assert!(why(b"\x76\x2f\x31\x01 an image").contains("no checkpoint"));
+    let endless = Checkpoint::read("/dev/zero".as_ref()).err().unwrap();
+    assert!(endless.to_string().contains("regular"), "{endless}");
     let mut newer = sample(false);
     newer[8] = VERSION as u8 + 1;
     assert!(why(&newer).contains(&format!("version {VERSION}")));

@@ -98,21 +98,16 @@ impl Scene {
                 .phases
                 .get(v.phase as usize)
                 .map_or("isotropic scattering".into(), |p| p.title());
-            return format!("{title} in the medium '{}' at {:?}:", m.name, v.p);
+            return format!("{title} in the medium '{}':", m.name);
         }
         let shape = v.primitive[0];
         let material = (shape != NONE).then(|| self.surface(shape).material);
         match material.flatten() {
             Some(m) => {
                 let m = &self.materials[m as usize];
-                format!(
-                    "{} of the material '{}' at {:?}:",
-                    m.bsdf.title(),
-                    m.name,
-                    v.p
-                )
+                format!("{} of the material '{}':", m.bsdf.title(), m.name)
             }
-            None => format!("the vertex at {:?}:", v.p),
+            None => "a vertex:".into(),
         }
     }
 }

@@ -38,6 +38,8 @@ use resolvent_api::{
     Decl, Error, Mode, ParamDecl, Params, PhaseFunction, Plugin, Scatter, ScatterDraws,
     ScatterEval, ScatterSample, Vec3,
 };
+use std::fs::File;
+use std::io::Read;
 use table::Table;
 
 /// The plugin.
@@ -88,8 +90,8 @@ impl Plugin for Tabulated {
         );
         let rows = match given {
             (Some(file), None, None) => {
-                let text = std::fs::read_to_string(&file)
-                    .map_err(|e| Error::new(format!("cannot read '{file}': {e}")))?;
+                let text =
+                    read(&file).map_err(|e| Error::new(format!("cannot read '{file}': {e}")))?;
                 parse::text(&text, abscissa)
                     .map_err(|fault| Error::new(format!("'{file}', {fault}")))?
             }
@@ -146,6 +148,20 @@ impl Scatter for Tabled<'_> {
     fn lobes(&self) -> u32 {
         lobes::SMOOTH
     }
+}
+
+/// Largest file that is read, bytes.
+const MAX_FILE: u64 = 64 << 20;
+
+fn read(file: &str) -> std::io::Result<String> {
+    let mut text = String::new();
+    File::open(file)?
+        .take(MAX_FILE + 1)
+        .read_to_string(&mut text)?;
+    if text.len() as u64 > MAX_FILE {
+        return Err(std::io::Error::other("has more than 64 MiB"));
+    }
+    Ok(text)
 }
 
 resolvent_api::export_plugin!(phase, Tabulated);

@@ -261,6 +261,8 @@ fn faults_name_file_and_line() {
         missing.contains("cannot read '/nowhere/table.txt'"),
         "{missing}"
     );
+    let endless = create::<Tabulated>(r#"{ "file": "/dev/zero" }"#).unwrap_err();
+    assert!(endless.contains("64 MiB"), "{endless}");
     for both in [
         r#"{}"#,
         r#"{ "at": [-1, 1] }"#,
