@@ -22,8 +22,6 @@ pub enum Kind {
 
 /// First bytes of OpenVDB files.
 const VDB_MAGIC: [u8; 4] = [0x20, 0x42, 0x44, 0x56];
-/// First bytes of checkpoints.
-const CHECKPOINT_MAGIC: [u8; 4] = *b"RSLV";
 /// First bytes of OpenEXR files.
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
@@ -70,7 +68,7 @@ pub fn kind(path: &Path) -> Outcome<Kind> {
         Ok(Kind::Usd)
     } else if first.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
         Ok(Kind::Scene)
-    } else if first == CHECKPOINT_MAGIC {
+    } else if first == resolvent_engine::checkpoint::MAGIC[..4] {
         Err(input(format!(
             "{0}: is a checkpoint; `resolvent merge {0} -o FILE.exr` makes a picture of it",
             path.display()

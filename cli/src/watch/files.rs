@@ -99,8 +99,8 @@ fn whole(path: &Path) -> PathBuf {
         .unwrap_or_else(|_| path.to_path_buf())
 }
 
-/// The files that lights, textures, shapes and instances of a scene name, those of models and the tiles of tiled images included.
-fn of_parts(scene: &Scene) -> BTreeSet<PathBuf> {
+/// The files that a scene depends on besides its own, whether they are there or not: whatever a text in it may name.
+pub fn of_scene(scene: &Scene, registry: &Registry) -> BTreeSet<PathBuf> {
     let mut out = BTreeSet::new();
     for path in crate::info::files_of_parts(scene) {
         if resolvent_gltf::is_model(&path) {
@@ -111,12 +111,6 @@ fn of_parts(scene: &Scene) -> BTreeSet<PathBuf> {
             None => drop(out.insert(path)),
         }
     }
-    out
-}
-
-/// The files that a scene depends on besides its own, whether they are there or not: whatever a text in it may name.
-pub fn of_scene(scene: &Scene, registry: &Registry) -> BTreeSet<PathBuf> {
-    let mut out = of_parts(scene);
     let mut texts = BTreeSet::new();
     let materials = scene.materials.values().map(|m| &m.block);
     let media = scene.media.values().map(|m| &m.block);

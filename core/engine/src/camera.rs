@@ -82,8 +82,8 @@ impl Camera {
         &self.filter
     }
 
-    /// The ray of a sample of `pixel` (column, row), as if nothing filled the place that it starts from: `film` is what the filter turns into a position around the pixel's
-    /// centre, `lens` chooses a point on the lens.
+    /// The ray of a sample of `pixel` (column, row), as if nothing filled the place that it starts from: `film` is what the filter
+    /// turns into a position around the pixel's centre, `lens` chooses a point on the lens.
     #[inline]
     pub fn ray(&self, pixel: [u32; 2], film: [f32; 2], lens: [f32; 2]) -> CameraRay {
         let at = |i: usize| pixel[i] as f32 + 0.5 + self.filter.sample(film[i]);

@@ -130,14 +130,10 @@ impl<'j> Job<'j> {
             features: u32::from(s.features),
             margin: (self.scene.camera.filter().radius() - 0.5).max(0.0),
         };
-        let done = piece::render(self.scene, self.integrator, &tile, s.orders, self.until());
+        let done = piece::render(self.scene, self.integrator, &tile, s.orders, self.until())
+            .and_then(|piece| piece.map(|p| self.add(p, index, into)).transpose());
         match done {
-            Ok(Some(finished)) => {
-                if let Err(why) = self.add(finished, index, into) {
-                    self.fail(why);
-                    return false;
-                }
-            }
+            Ok(Some(())) => {}
             Ok(None) => {
                 let out_of_time = !self.is_stopped();
                 self.out_of_time.fetch_or(out_of_time, Ordering::Relaxed);

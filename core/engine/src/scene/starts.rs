@@ -22,8 +22,9 @@ impl Starts {
             if lo == hi {
                 return Some(scene.interiors_at(lo));
             }
+            // Everything is clear of an empty box.
             let clear = hi.cmplt(filled.min.into()).any() || lo.cmpgt(filled.max.into()).any();
-            (clear || filled.is_empty()).then_some(0)
+            clear.then_some(0)
         };
         let light = |light| {
             let at = Bound::of(light, scene.lanes)?;
@@ -68,9 +69,6 @@ fn filled(scene: &Scene) -> Aabb {
         {
             filled = filled.including(lo).including(hi);
         }
-    }
-    if filled.is_empty() {
-        return filled;
     }
     let pad = 1e-4 * filled.extent();
     Aabb {

@@ -174,6 +174,7 @@ impl View<'_> {
         edge: &mut Edge,
         next: &mut Vertex,
     ) -> Result<bool, Status> {
+        self.go_on()?;
         if WITH_MEDIA {
             *edge = resolvent_pathspace::mis::clear(0.0);
         } else {
@@ -390,6 +391,7 @@ impl View<'_> {
         u: &FlightDraws,
         edge: &mut Edge,
     ) -> Result<bool, Status> {
+        self.go_on()?;
         let (o, inside) = self.scene.leave(from, to.wi.into());
         let ray = self.towards(o, to);
         if SURFACES && let Some(accel) = &self.scene.accel {

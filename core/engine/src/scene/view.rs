@@ -93,7 +93,7 @@ impl<'s> View<'s> {
 
     /// Counts a ray; an error if the work is to stop.
     #[inline(always)]
-    fn go_on(&self) -> Result<(), Status> {
+    pub(super) fn go_on(&self) -> Result<(), Status> {
         let calls = self.calls.get().wrapping_add(1);
         self.calls.set(calls);
         if self.until.is_due(calls) {
@@ -239,9 +239,6 @@ unsafe extern "C" fn emerge<const SURFACES: bool, const MEDIA: u8>(
 ) -> Status {
     // SAFETY: as above.
     let (v, ray, u, edge, next) = unsafe { (view(ctx), &*ray, &*u, &mut *edge, &mut *next) };
-    if let Err(status) = v.go_on() {
-        return status;
-    }
     v.travel::<SURFACES, MEDIA>(ray.o.into(), ray.d.into(), ray.inside, u, edge, next)
 }
 
@@ -264,9 +261,6 @@ unsafe extern "C" fn propagate<const SURFACES: bool, const MEDIA: u8>(
             &mut *next,
         )
     };
-    if let Err(status) = v.go_on() {
-        return status;
-    }
     let (o, inside) = v.scene.leave(from, wi);
     v.travel::<SURFACES, MEDIA>(o, wi, inside, u, edge, next)
 }
@@ -337,9 +331,6 @@ unsafe extern "C" fn connect<const SURFACES: bool, const MEDIA: u8>(
 ) -> Status {
     // SAFETY: as above.
     let (v, from, to, u, edge) = unsafe { (view(ctx), &*from, &*to, &*u, &mut *edge) };
-    if let Err(status) = v.go_on() {
-        return status;
-    }
     v.join::<SURFACES, MEDIA>(from, to, u, edge)
 }
 

@@ -210,10 +210,11 @@ impl Subpath {
             }
             if self.len == MOST_VERTICES {
                 let last = &self.nodes[self.len - 1].vertex;
-                return Err(scene.fault(
-                    last,
-                    "a walk has scattered 131071 times, and no longer one is kept whole: set `max_depth`, or use the integrator pt",
-                ));
+                let most = MOST_VERTICES - 1;
+                let why = format!(
+                    "a walk has scattered {most} times, and no longer one is kept whole: set `max_depth`, or use the integrator pt"
+                );
+                return Err(scene.fault(last, &why));
             }
             let at = self.push();
             let (before, rest) = self.nodes.split_at_mut(at);
